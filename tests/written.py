@@ -3,6 +3,10 @@
 from pathlib import Path
 
 from jamshape.files.content import Content
+from jamshape.protocols.approach import FOR_A_PACKING
+
+FINISHED = {"kind": FOR_A_PACKING, "finished": True}
+"""Attributes of the file of a finished compression for a packing."""
 
 
 def write_content(path, frames, attributes=None, rows=(), report=()):

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from jamshape.command import parser_of, report, run
-from jamshape.front.run import EnsembleFile
+from jamshape.front.ensemble_file import EnsembleFile
 from jamshape.recording.workers import cores
 
 _CALL = """

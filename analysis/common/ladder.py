@@ -1,12 +1,10 @@
-"""One packing at several energies, relaxed from one to the next, up and down from its own.
+"""One packing at several energies, a file each, brought from one to the next (`protocols.ladder`), up and down from its own.
 
-Steps in sqrt(u) are small enough for the particles to follow (`target.extrapolation`); if they rearrange
-nevertheless, each rung reports the fraction of the original contacts.
+If particles rearrange on the way, each rung reports the fraction of the original contacts.
 """
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -19,11 +17,10 @@ from jamshape.contacts import find_contacts, find_rattlers
 from jamshape.files.h5md import read_attributes, read_packing, require_attributes
 from jamshape.landscape import Landscape, State
 from jamshape.measures.packing_summary import write_minimum
-from jamshape.minima import Minimum, Outcome, Stop, minimise
-from jamshape.minima.target import Search, Target, TargetError, extrapolation
+from jamshape.minima.target import Target, TargetError
 from jamshape.packing import Packing
+from jamshape.protocols.ladder import bring
 from jamshape.protocols.make import is_done
-from jamshape.protocols.retry import Retry, go_on
 from jamshape.shapes.shape import in_name
 
 # Attributes that the packing and existing rungs must share.
@@ -33,9 +30,6 @@ _IDENTITY = (
 
 # Attributes that describe the search for the packing itself, not for a rung.
 _OF_SOURCE = ("strict", "retry_", "n_negative", "n_kinked", "lowest_eigenvalue")
-
-_FALLEN = 1e-2  # fraction of u0 below which the box was opened too far
-_EVALUATIONS = 2000  # limit of a minimisation after opening
 
 
 class Rung(NamedTuple):
@@ -108,16 +102,10 @@ def _step(source: Path, stored: dict[str, Any], last: Path, folder: Path, goal: 
         return Rung(out, goal.u0, made=False, failure="")
     began, start = time.perf_counter(), read_packing(last)
     landscape = Landscape(start)
-    search = Search(_opened(landscape, State.of(start), goal), goal.step)
     try:
-        for _ in extrapolation(landscape, search, goal):
-            pass
+        minimum = bring(landscape, State.of(start), goal)
     except TargetError as error:
         return Rung(out, goal.u0, made=False, failure=str(error))
-    assert search.minimum is not None
-    minimum = search.minimum
-    if not minimum.is_at_rest:
-        minimum = retried(landscape, minimum, goal, landscape.evaluations)
     shared = _shared(read_packing(source), minimum.state.packing(start))
     known = {name: value for name, value in stored.items() if not name.startswith(_OF_SOURCE)}
     attributes = known | {name: getattr(goal, name) for name in ("u0", "accuracy", "tolerance")}
@@ -130,21 +118,6 @@ def _step(source: Path, stored: dict[str, Any], last: Path, folder: Path, goal: 
     return Rung(out, goal.u0, made=True, failure="")
 
 
-def _opened(landscape: Landscape, state: State, goal: Target) -> State:
-    """Open the box until u is about u0; sliding rods would make small steps slow.
-
-    Uses `measures.packing_summary.energy_onset`: sqrt(u) is linear in phi, d sqrt(u)/dphi = (p + u) / (2 phi sqrt(u)).
-    """
-    evaluation, volume, D = landscape.evaluate(state), state.volume, state.dimension
-    u, p = evaluation.energy / volume, -evaluation.strain_gradient / (D * volume)
-    if u <= goal.u0:
-        return state
-    strain = 2 * u / (p + u) * (1 - math.sqrt(goal.u0 / u)) / D
-    stop = Stop(goal.tolerance, lowest=_FALLEN * goal.u0, evaluations=_EVALUATIONS)
-    found = minimise(landscape, state.strained(strain), "newton", stop)
-    return state if found.outcome is Outcome.UNJAMMED else found.state
-
-
 def _shared(first: Packing, other: Packing) -> float:
     """Fraction of the contacts of one packing, without those of rattlers, that another one has."""
     network = find_contacts(first, sides=2)
@@ -153,11 +126,3 @@ def _shared(first: Packing, other: Packing) -> float:
     now = {tuple(pair) for pair in find_contacts(other, sides=2).pairs.tolist()}
     kept = [tuple(pair) in now for pair in held.tolist()]
     return float(np.mean(kept)) if kept else 1.0
-
-
-def retried(landscape: Landscape, minimum: Minimum, target: Target, budget: int) -> Minimum:
-    """Repeat the search from an unbalanced minimum; return the minimum itself if that does not help."""
-    retry = Retry(minimum.state, budget)
-    for _ in go_on(landscape, retry, target):
-        pass
-    return retry.minimum or minimum

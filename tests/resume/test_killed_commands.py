@@ -120,6 +120,12 @@ CASES = {
         ("packing.h5",),
         patches=EVERY,
     ),
+    "minimise": Case(
+        ("minimise",),
+        ("minimum.h5",),
+        patches=(*EVERY, ("jamshape.protocols.stages.EVALUATIONS", 30)),
+        given={"packing.h5": one_of_rods},
+    ),
     "sweep": Case(
         ("sweep", "--alpha", 0, 1, *DYNAMICS[2:], "--samples", 1, "--jobs", 2),
         tuple(f"alpha{alpha}_seed1.h5" for alpha in (0, 1)),

@@ -38,7 +38,7 @@ def compression(path, seed=1, shift=0.0, ends=(0.8, 0.9), slope=0.2, **attribute
     rng = np.random.default_rng(seed)
     first = packing(rng.uniform(0, 7, 3))
     known = {"alpha": 4.0, "n": 1024, "kappa": 1e-6, "size_ratio": 1.4, "k_e": 1.0, "sides": 2}
-    known |= {"seed": seed, "finished": True} | attributes
+    known |= {"seed": seed, "kind": "compression", "finished": True} | attributes
     n = known["n"]
     S = {f"S_{k}": orientational_order(rng.uniform(0, 7, n), k).S_n for k in (2, 4)}
     phi, steps = np.linspace(*ends, 81), np.arange(81)

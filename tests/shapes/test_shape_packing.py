@@ -19,7 +19,7 @@ from every_shape import (
 )
 from making import made as made_of
 from making import stage_of, stages_of, write_every_mark
-from written import write_columns
+from written import FINISHED, write_columns
 
 from common.energy_along import AlongModes
 from common.ladder import climb
@@ -194,7 +194,7 @@ def compressed(recipe, out, packing):
     phi = np.linspace(0.9, 1.0, 20) * packing.phi
     rows = {"phi": phi, "pressure": 0.0 * phi, "kappa": np.ones(20)}
     write_columns(
-        out.with_name(out.name + ".run.h5"), packing, recipe.attributes() | {"finished": True}, rows
+        out.with_name(out.name + ".run.h5"), packing, recipe.attributes() | FINISHED, rows
     )
 
 

@@ -8,6 +8,7 @@ import warnings
 
 import numpy as np
 import pytest
+from dumps import read_dump
 from every_shape import (
     EPS,
     MIXTURES,
@@ -41,7 +42,7 @@ from pair_scenes import packing_of
 from superellipsoid_scenes import crowd
 
 from jamshape.contacts import forces
-from jamshape.files.lammps_text import read_data, read_dump, write_data
+from jamshape.files.lammps_text import read_data, write_data
 from jamshape.flow.compression import Compression, CompressionRun
 from jamshape.lammps.session import Session
 from jamshape.shapes.shape import ElongatedShape

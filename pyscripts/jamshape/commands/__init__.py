@@ -28,6 +28,7 @@ COMMANDS = {
     "shear": "shear at a constant rate; record stress, order and snapshots",
     "cycle": "shear to and fro; record stress, and displacements from cycle to cycle",
     "aqs": "shear by small steps with a minimisation after each; record stress and its drops",
+    "ladder": "take a packing through energies; record which contacts open and close",
     "sweep": "make many packings on all cores",
     "reproduce": "make all data and figures of a paper, with its numbers beside ours",
     "modes": "compute vibrational modes and elastic moduli of a packing",

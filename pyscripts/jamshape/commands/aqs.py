@@ -2,6 +2,8 @@
 
     jamshape aqs --alpha 4 --n 256 --phi 0.9 --step 1e-3 --strain 0.5 --out aqs.h5
 
+    jamshape aqs --start packing.h5 --step 1e-3 --amplitude 0.05 --cycles 10 --out cycles.h5
+
 Starts from the last frame of a packing or run file (--start), or compresses a random packing quasistatically to
 --phi. The volume is held, or with --pressure the pressure. The last line of standard output is one JSON object: the
 final stress, the modulus of the first step, averages over the steady state, and the stress drops, each with the

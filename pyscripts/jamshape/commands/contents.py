@@ -6,7 +6,7 @@ import math
 import struct
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -23,12 +23,15 @@ from jamshape.files.h5md import (
     read_packing,
     read_report,
 )
-from jamshape.files.lammps_text import iter_dump, read_data
+from jamshape.files.lammps_text import read_data
 from jamshape.files.meaning import NOTHING, Wanted
 from jamshape.files.outcomes import is_reached, shortfall
 from jamshape.files.signature import DATA, DUMP, GSD, HDF5, REFUSED, RESTART, SIGNATURES, format_of
+from jamshape.front.frames import frames
 from jamshape.front.packing import Packing, public, results_of
+from jamshape.front.recorded import KINDS
 from jamshape.packing import Packing as PackingLike
+from jamshape.recording.driver import KIND
 from jamshape.vibration.ensembles import TOLD, count_of, of_packing
 from jamshape.vibration.table import ModeTable, holds_modes, read_modes
 
@@ -39,31 +42,8 @@ _MADE = ("seed", "kappa", "u0", "protocol", "phi_start", "phi_end", "gdot",
          "amplitude", "period", "cycles", "flow", "strain_step", "strain_end", "hold_pressure", "outcome")  # fmt: skip
 
 
-class _Stored(NamedTuple):
-    """Name, mark and continuation of a kind of file with particles."""
-
-    kind: str
-    mark: str
-    """Attribute that only files of this kind have."""
-    go_on: str
-    """Advice for continuing, if not finished."""
-
-
 _SAME_COMMAND = "repeat the command that began it"
 _OTHER_COMMAND = "repeat the command for {result}, which continues from this file"
-
-# The first match counts.
-_STORED = (
-    _Stored("packing in the making", "stage", _OTHER_COMMAND),
-    _Stored("slow run", "flow_steps", _SAME_COMMAND),
-    _Stored("compression for a packing", "rate", _OTHER_COMMAND),
-    _Stored("compression for a packing", "of_packing", _OTHER_COMMAND),
-    _Stored("quasistatic shear", "shear_steps", _SAME_COMMAND),
-    _Stored("cyclic shear", "amplitude", _SAME_COMMAND),
-    _Stored("shear", "gdot", _SAME_COMMAND),
-    _Stored("run", "finished", _SAME_COMMAND),
-    _Stored("packing", "", ""),
-)
 
 # Suffixes of files beside an unfinished packing.
 _ENDS = (".making.h5", ".run.h5")
@@ -117,11 +97,11 @@ def _hdf5(path: Path) -> dict[str, Any]:
 def _particles(path: Path) -> dict[str, Any]:
     """Describe an H5MD file."""
     known, packing = read_attributes(path), read_packing(path)
-    stored = next(one for one in _STORED if not one.mark or one.mark in known)
-    found: dict[str, Any] = {"kind": stored.kind, **_of_packing(packing)}
+    is_run = str(known.get(KIND)) in KINDS
+    found: dict[str, Any] = {"kind": known[KIND] if is_run else "packing", **_of_packing(packing)}
     is_changed = bool(known) and not results_of(path, packing)
     found |= _state(packing, {} if is_changed else _measured(path, known))
-    found |= _picked(known, _MADE) | {"finished": bool(known.get("finished", not stored.mark))}
+    found |= _picked(known, _MADE) | {"finished": bool(known.get("finished", not is_run))}
     if "kappa" in found:
         found["kappa"] = np.ravel(found["kappa"])[-1].item()
     if "outcome" in known:
@@ -130,7 +110,7 @@ def _particles(path: Path) -> dict[str, Any]:
     found |= {"format_version": read_format_version(path), "jamshape_version": read_creator(path)}
     found |= {"origin": origin} if (origin := read_origin(path)) else {}
     if not found["finished"]:
-        found["go_on"] = stored.go_on.format(path=path, result=_result_of(path))
+        found["go_on"] = _go_on(path, known)
     return found
 
 
@@ -192,6 +172,14 @@ def _cost(path: Path, known: Mapping[str, Any]) -> dict[str, Any]:
     return found | ({"error": float(known["residual"])} if "residual" in known else {})
 
 
+def _go_on(path: Path, known: Mapping[str, Any]) -> str:
+    """Advise how to continue an unfinished run."""
+    kind = KINDS.get(str(known.get(KIND)))
+    if kind and kind.plan_of is None:
+        return _OTHER_COMMAND.format(result=_result_of(path))
+    return _SAME_COMMAND
+
+
 def _result_of(path: Path) -> Path:
     """Name the packing beside which a file lies."""
     for end in _ENDS:
@@ -220,9 +208,8 @@ def _require_told(told: Mapping[str, Any], wanted: Wanted) -> None:
 
 
 def _dump(path: Path, wanted: Wanted) -> dict[str, Any]:
-    for frames, packing in enumerate(iter_dump(path, *wanted), 1):
-        last, count = packing, frames
-    return _text("LAMMPS dump", last) | {"frames": count}
+    found = frames(path, dimension=wanted.dimension, shape=wanted.shape)
+    return _text("LAMMPS dump", found[-1]) | {"frames": len(found)}
 
 
 def _data(path: Path, wanted: Wanted) -> dict[str, Any]:
@@ -253,9 +240,6 @@ def _restart(path: Path) -> dict[str, Any]:
             at += struct.calcsize(f"={kind}")
     known = {"lammps": entries[0], "step": entries[6], "dimension": entries[7]}
     go_on = f"lmp -in DECK -var restart {path}, with all other settings as before"
-    if path.suffix in {".a", ".b"} and (run := path.with_suffix("").with_suffix("")).exists():
-        stored = next(one for one in _STORED if not one.mark or one.mark in read_attributes(run))
-        go_on = stored.go_on.format(path=run, result=_result_of(run))
     return {"kind": "LAMMPS restart file", **known, "finished": False, "go_on": go_on}
 
 

@@ -1,6 +1,7 @@
 """Draw packings of any shape, in the plane and in space.
 
     jamshape draw FILE [MORE ...] [--frame -1] [--color kind] --out packing.png
+    jamshape draw RUN.h5 --out movie.gif
 
 FILE is H5MD, a LAMMPS dump or a data file. In the plane black lines show the spines and red dots the
 contacts; in space each particle whose centre is in the box is drawn whole, in parallel projection. Colours show the
@@ -8,7 +9,7 @@ kinds of particles, with rattlers in grey (unless all are); the order of the nei
 grows and grey without contacts: nematic (S2), tetratic (S4, in the plane), cubatic (C4, in space); the orientation;
 or the packing (one). As in Fig. 7 of Marschall & Teitel, PRE 97, 012905, and Figs. 2, 4 b, c and 8 b of Yuan,
 VanderWerf, Shattuck & O'Hern, Soft Matter (2019). The last line of standard output is one JSON object with the
-counts.
+counts. A name such as movie.gif or movie.mp4, which needs ffmpeg, makes a movie of all frames of one file.
 """
 
 from __future__ import annotations
@@ -21,14 +22,20 @@ import numpy as np
 from jamshape.checks import ArgumentError, Range, require_in, require_other_file, require_stated
 from jamshape.command import parser_of, report, typed
 from jamshape.drawing.colors import CHOICES
+from jamshape.drawing.movie import MOVIES
 from jamshape.drawing.packing import Look
 from jamshape.drawing.pictures import draw_pictures, read_picture, save_pictures
 from jamshape.files.meaning import Wanted
+from jamshape.front.files import load
+from jamshape.front.frames import frames
+from jamshape.front.movies import animate
+from jamshape.packing import Packing
 from jamshape.shapes.command_line import add_meaning_options
 
 _ANGLE = Range(-360.0, 360.0, "degrees")
 
 _HEIGHT, _TURN = 22, -58  # default view
+_PIXELS = 200  # in an inch
 
 
 def options_of() -> ArgumentParser:
@@ -37,14 +44,14 @@ def options_of() -> ArgumentParser:
     parser.add_argument(
         "files", type=Path, nargs="+", metavar="FILE", help="H5MD, dumps, data files"
     )
-    parser.add_argument(
-        "--frame", type=int, default=-1, help="frame; negative counts from the end (-1)"
-    )
+    parser.add_argument("--frame", type=int, help="frame; negative counts from the end (-1)")
+    parser.add_argument("--every", type=int, help="show every n-th frame in a movie (1)")
+    parser.add_argument("--fps", type=float, help="frames per second of a movie (10)")
     parser.add_argument(
         "--color", choices=CHOICES, default="kind", help="quantity shown by colour (%(default)s)"
     )
     sides = "points of a side-to-side contact; auto: as in the file, or else 2 (auto)"
-    parser.add_argument("--sides", choices=("auto", "1", "2"), default="auto", help=sides)
+    parser.add_argument("--sides", choices=("auto", "1", "2"), help=sides)
     up, around = (
         f"elevation of the view in space, degrees ({_HEIGHT})",
         f"azimuth of the view ({_TURN})",
@@ -55,7 +62,7 @@ def options_of() -> ArgumentParser:
         "refinement of meshes in space, 1 to 4; each makes four triangles of one (3, or 2 for many)"
     )
     parser.add_argument("--level", type=int, choices=range(1, 5), help=finer)
-    parser.add_argument("--dpi", type=int, default=200, help="dots per inch (%(default)s)")
+    parser.add_argument("--dpi", type=int, help=f"dots per inch ({_PIXELS}, of a movie 100)")
     add_meaning_options(parser)
     return parser
 
@@ -71,19 +78,46 @@ def _look(options: Namespace, *, in_space: bool) -> Look:
     return Look(options.color, asked["height"], asked["turn"], asked["level"])
 
 
+def _movie(options: Namespace) -> None:
+    """Make a movie of a file, and report."""
+    _require_none(options, "frame", "sides", "height", "turn", "level")
+    if len(options.files) > 1:
+        msg = f"{len(options.files)} files were given for a movie, expected one"
+        raise ValueError(msg)
+    [path] = options.files
+    meaning = {"dimension": options.dimension, "shape": options.shape}
+    found = load(path, **meaning)
+    shown = frames(path, **meaning) if isinstance(found, Packing) else found
+    animate(shown, options.out, color=options.color, **typed(options, "fps", "every", "dpi"))
+    report({"out": options.out, "frames": len(range(0, len(shown), options.every or 1))})
+
+
+def _require_none(options: Namespace, *names: str) -> None:
+    """Refuse options without effect."""
+    kind = "movie" if options.out.suffix.lower() in MOVIES else "picture"
+    for name, value in typed(options, *names).items():
+        said = f"{{{name}}} has no effect on a {kind}; leave it out, or choose another suffix of {{out}}"
+        raise ArgumentError(said, {name: value, "out": options.out})
+
+
 def main(options: Namespace) -> None:
     """Read, find the contacts, draw, report."""
     require_other_file(options.out, options.files)
-    require_stated(dpi=options.dpi)
+    if options.out.suffix.lower() in MOVIES:
+        _movie(options)
+        return
+    _require_none(options, "every", "fps")
+    dpi = _PIXELS if options.dpi is None else options.dpi
+    require_stated(dpi=dpi)
     for name, value in typed(options, "height", "turn").items():
         require_in(f"--{name}", value, _ANGLE)
-    sides = None if options.sides == "auto" else int(options.sides)
-    how = options.frame, sides, options.color
+    sides = int(options.sides) if options.sides in {"1", "2"} else None
+    how = -1 if options.frame is None else options.frame, sides, options.color
     wanted = Wanted(options.dimension, options.shape)
     pictures = [read_picture(path, *how, wanted) for path in options.files]
     look = _look(options, in_space=any(row.report["dimension"] == 3 for row in pictures))
     figure, colored = draw_pictures(pictures, look)
-    save_pictures(figure, pictures, options.out, options.dpi)
+    save_pictures(figure, pictures, options.out, dpi)
     rows = [one.report for one in pictures]
     for row, colors in zip(rows, colored, strict=True):
         if len(colors.values):

@@ -25,11 +25,10 @@ from jamshape.exchange.ovito import to_ovito
 from jamshape.exchange.tools import tool
 from jamshape.files.disk import replacing
 from jamshape.files.h5md import write_packing, write_run
-from jamshape.files.lammps_text import read_dump, write_data
+from jamshape.files.lammps_text import write_data, write_dump
 from jamshape.files.meaning import NOTHING, Wanted
-from jamshape.files.signature import DUMP, format_of
 from jamshape.front.files import load
-from jamshape.front.run import Recorded
+from jamshape.front.frames import frames
 from jamshape.packing import Packing
 from jamshape.shapes.command_line import add_meaning_options
 
@@ -76,6 +75,7 @@ FORMATS = {
         ".h5md", True, write_mdanalysis, "H5MD as MDAnalysis reads it, in 2D too"
     ),
     "data": _Format(".data", False, _write_data, "a data file of LAMMPS"),
+    "dump": _Format(".dump", True, write_dump, "a dump of LAMMPS"),
     "h5": _Format(".h5", True, _write_h5, "H5MD of jamshape"),
 }
 
@@ -125,11 +125,9 @@ def frames_of(path: Path, frame: int | None, wanted: Wanted = NOTHING) -> Sequen
     ValueError
         If the frame does not exist, or the file holds modes.
     """
-    if frame is None and format_of(path) == DUMP:
-        return read_dump(path, *wanted)
+    if frame is None:
+        return frames(path, **wanted._asdict())
     found = load(path, frame, **wanted._asdict())
-    if isinstance(found, Recorded):
-        return list(found)
     if isinstance(found, Packing):
         return [found]
     msg = f"{path} holds modes, expected a packing or a run"

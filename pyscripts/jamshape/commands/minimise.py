@@ -16,8 +16,8 @@ from argparse import ArgumentParser, Namespace
 from jamshape.checks import require_other_file
 from jamshape.command import report
 from jamshape.commands.signatures import called, parser_for
-from jamshape.front.files import packing_of
 from jamshape.front.minimising import minimise
+from jamshape.front.reading import packing_of
 from jamshape.protocols.make import summary_of
 from jamshape.shapes.command_line import add_meaning_options
 

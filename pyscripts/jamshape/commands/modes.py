@@ -3,8 +3,8 @@
     jamshape modes PACKING.h5 --out modes.h5
 
 Eigenvalues of the dynamical matrix with signs and error bounds, bands and their counts, participation,
-kinds of motion and elastic moduli, to HDF5 (see jamshape.vibration.table). PACKING is H5MD from `jamshape pack`,
-of any shape. Needs no LAMMPS. The last line of standard output is one JSON object.
+kinds of motion and elastic moduli, to HDF5 (see jamshape.vibration.table). PACKING is any file with particles at rest: of
+`jamshape pack` or `jamshape minimise`, a LAMMPS dump or data file, GSD. Needs no LAMMPS. The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import packing_text
 from jamshape.files.ensembles import PackingFile
 from jamshape.front.modes import Modes, modes, require_modes_file
+from jamshape.front.reading import packing_of
+from jamshape.shapes.command_line import add_meaning_options
 from jamshape.vibration.ensembles import TOLD
 from jamshape.vibration.statistics import Redundancy, redundancies
 from jamshape.vibration.table import BANDS, MODULI, ModeTable
@@ -39,6 +41,10 @@ def options_of() -> ArgumentParser:
     parser.add_argument("--out", type=Path, default=out, help="HDF5 file to write (%(default)s)")
     parser.add_argument("--plot", type=Path, help="D(omega), participation and kinds of motion")
     parser.add_argument("--vectors", action="store_true", help="store eigenvectors")
+    parser.add_argument(
+        "--frame", type=int, default=-1, help="frame; negative counts from the end (-1)"
+    )
+    add_meaning_options(parser)
     return parser
 
 
@@ -139,7 +145,10 @@ def main(options: Namespace) -> None:
     require_modes_file(options.out, [options.packing])
     if options.plot:
         require_other_file(options.plot, [options.packing, options.out])
-    found: Modes = called(modes, options)
+    meaning = {"dimension": options.dimension, "shape": options.shape}
+    found: Modes = called(
+        modes, options, packing=packing_of(options.packing, options.frame, **meaning)
+    )
     table, packing, matrix = found.table, found.packing, found.matrix
     assert packing is not None
     assert matrix is not None
@@ -149,7 +158,9 @@ def main(options: Namespace) -> None:
     extra = table.attributes.get("n_self_stress", 1) > 1
     redundant = tell_redundant(redundancies(matrix) if extra else [], packing.id)
     if options.plot:
-        file = PackingFile.read(options.packing)
+        file = PackingFile(
+            options.packing, dict(packing.results), (packing.shape_style, packing.dimension)
+        )
         save_figure(mode_figure(found.told, packing_text(file)), options.plot)
     told = {
         "out": options.out,

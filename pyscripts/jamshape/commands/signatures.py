@@ -13,7 +13,7 @@ import re
 import types
 import typing
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -102,6 +102,8 @@ def _options(function: Callable[..., Any]) -> dict[str, list[_Option]]:
             usual = parameter.default if is_pair else [parameter.default]
             texts = text.partition(", and ")[::2] if is_pair else [text]
             keywords = _keywords(name, kind, known)
+            if _is_several(parameter.annotation):
+                keywords["nargs"] = "+"
             if parameter.default is parameter.empty:
                 keywords["metavar"] = name.upper()
             found[name] = [
@@ -113,11 +115,23 @@ def _options(function: Callable[..., Any]) -> dict[str, list[_Option]]:
 
 def _kind(annotation: Any) -> tuple[type, bool]:
     """Return the type of an option, and whether there are two."""
-    kinds = typing.get_args(annotation) if isinstance(annotation, types.UnionType) else [annotation]
+    kinds = _kinds(annotation)
+    if _is_several(annotation):
+        return _kind(typing.get_args(kinds[0])[0])
     for kind in kinds:
         if typing.get_origin(kind) is tuple:
             return _kind(typing.get_args(kind)[-1])[0], True
     return next(kind for kind in (Path, str, float, int, bool) if kind in kinds), False
+
+
+def _kinds(annotation: Any) -> Sequence[Any]:
+    """Return the types of an annotation."""
+    return typing.get_args(annotation) if isinstance(annotation, types.UnionType) else [annotation]
+
+
+def _is_several(annotation: Any) -> bool:
+    """Whether an option takes one value or more."""
+    return typing.get_origin(_kinds(annotation)[0]) is Sequence
 
 
 def _keywords(name: str, kind: type, known: str) -> dict[str, Any]:

@@ -70,7 +70,7 @@ def draw_steps(axes: Axes, observables: Mapping[str, FloatArray], system: System
         places = [event.strain for event in events], [event.stress for event in events]
         axes.plot(*places, "k.", ms=4, label="stress begins to drop")
     unit = pressure_unit([system])
-    axes.set(xlabel=r"strain $\gamma$", ylabel=rf"stress  ${unit}$", xlim=(0, strain[-1]))
+    axes.set(xlabel=r"strain $\gamma$", ylabel=rf"stress  ${unit}$", xlim=sorted((0, strain[-1])))
     axes.set_title(f"{systems_text([system])}, quasistatic shear", size=9)
     axes.legend(fontsize=8)
 

@@ -74,13 +74,15 @@ def mean_normals(mesh: SurfaceMesh) -> FloatArray:
     return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
 
 
-def faces_of(packing: Packing, level: int, seen_from: View) -> Faces:
+def faces_of(
+    packing: Packing, level: int, seen_from: View, centers: FloatArray | None = None
+) -> Faces:
     """Cover particles with triangles and keep those that face the viewer.
 
-    Particles are drawn where their centres are in the box; equal shapes share one mesh.
+    Particles are drawn at (N, 3) centres, by default those in the box; equal shapes share one mesh.
     """
-    box = packing.box
-    centers = box.lo + box.wrapped(packing.position)[0]
+    if centers is None:
+        centers = packing.box.lo + packing.box.wrapped(packing.position)[0]
     turned = np.stack([packing.body_axes(k) for k in range(3)], axis=1)
     kinds = np.column_stack([packing.diameters, packing.exponent])
     found = []

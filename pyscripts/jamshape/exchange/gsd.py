@@ -13,12 +13,14 @@ single-precision numbers, these take precedence: see `jamshape.exchange.edited`.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable, Mapping
 from functools import lru_cache, singledispatch
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from jamshape.arrays import FloatArray, IntArray
 from jamshape.exchange.edited import as_edited
 from jamshape.exchange.fields import alike, box_fields, centered, packing_of, particle_fields
 from jamshape.exchange.tools import tool
@@ -32,6 +34,7 @@ from jamshape.shapes.solid import Balls, Solid, Superquadric
 from jamshape.shapes.table import shape_named
 
 _LOG, _PARTICLES = "jamshape/", "particles/jamshape/"
+_COLUMNS = "columns/"
 
 _FINE, _COARSE = 3, 1  # levels of meshes, so that files stay small
 _FEW, _MANY = 8, 64  # numbers of types up to which meshes are fine and medium
@@ -44,7 +47,8 @@ def write_gsd(path: PathLike, packings: Packing | Iterable[Packing]) -> None:
     ----------
     path : path-like
     packings : Packing or iterable of Packing
-        Frames, all in 2D or all in 3D; a run from `jamshape.load` is one.
+        Frames, all in 2D or all in 3D; a run from `jamshape.load` is one. Of their other columns, numbers that all
+        frames have are written.
 
     Raises
     ------
@@ -71,11 +75,17 @@ def write_gsd(path: PathLike, packings: Packing | Iterable[Packing]) -> None:
         raise ValueError(msg)
     hoomd = tool("gsd.hoomd", "gsd")
     form = Form()
+    columns = set(frames[0].columns)
     for packing in frames:
         form = form.joined(Form.of(packing))
+        columns &= {name for name, x in packing.columns.items() if x.dtype.kind in "iuf"}
+    if texts := {name for p in frames for name, x in p.columns.items() if x.dtype.kind == "U"}:
+        said = f"{path} is a GSD file, which holds numbers: the columns {', '.join(sorted(texts))} are left out"
+        warnings.warn(said, stacklevel=2)
     with replacing(path) as temporary, hoomd.open(str(temporary), "w") as file:
         for packing in frames:
-            file.append(_frame(hoomd, packing, form))
+            held = {name: x for name, x in packing.columns.items() if name in columns}
+            file.append(_frame(hoomd, packing.with_(columns=held), form))
 
 
 def read_gsd(path: PathLike, frame: int = -1) -> Packing:
@@ -102,13 +112,28 @@ def read_gsd(path: PathLike, frame: int = -1) -> Packing:
         If the file cannot be opened.
     """
     hoomd = tool("gsd.hoomd", "gsd")
+    with _opened(hoomd, path) as file:
+        return _packing(path, hoomd, file[row_of(frame, len(file), path)])
+
+
+def read_gsd_clock(path: PathLike) -> tuple[IntArray, FloatArray]:
+    """Read steps (T,) and times (T,) of the frames; errors as `read_gsd`."""
+    with _opened(tool("gsd.hoomd", "gsd"), path) as file:
+        chunks = (("configuration/step", 0), (f"log/{_LOG}time", 0.0))
+        step, time = (
+            [file.file.read_chunk(k, name)[0] if file.file.chunk_exists(k, name) else otherwise
+             for k in range(len(file))]
+            for name, otherwise in chunks
+        )  # fmt: skip
+        return np.array(step, np.int64), np.array(time, np.float64)
+
+
+def _opened(hoomd: Any, path: PathLike) -> Any:
     try:
-        file = hoomd.open(str(path), "r")
+        return hoomd.open(str(path), "r")
     except RuntimeError as error:
         msg = f"{path}: {error}, expected a GSD file; write it with write_gsd"
         raise FileFormatError(msg) from error
-    with file:
-        return _packing(path, hoomd, file[row_of(frame, len(file), path)])
 
 
 def _frame(hoomd: Any, packing: Packing, form: Form) -> Any:
@@ -128,6 +153,7 @@ def _frame(hoomd: Any, packing: Packing, form: Form) -> Any:
     level = _FINE if len(species) <= _FEW else _COARSE + (len(species) <= _MANY)
     frame.particles.type_shapes = [_type_shape(_Body.of(packing, i, level)) for i in kinds.first]
     exact = {_PARTICLES + name: x for name, x in particle_fields(packing, rests=form.rests).items()}
+    exact |= {f"{_PARTICLES}{_COLUMNS}{name}": x for name, x in packing.columns.items()}
     of_box = box_fields(packing, rests=form.rests, tilted=form.tilted)
     exact |= {_LOG + name: x for name, x in of_box.items()}
     exact[_LOG + "time"] = np.array([packing.time])
@@ -210,6 +236,8 @@ def _packing(path: PathLike, hoomd: Any, frame: Any) -> Packing:
     }
     try:
         style, time = bytes(found.pop("shape_style")).decode(), float(found.pop("time")[0])
+        columns = [name for name in found if name.startswith(_COLUMNS)]
+        found["columns"] = {name.removeprefix(_COLUMNS): found.pop(name) for name in columns}
         if "law" in found:  # missing in files of 0.1.0
             *numbers, sides = found["law"].tolist()
             n = math.isqrt(len(numbers))

@@ -29,6 +29,10 @@ _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
 _OTHERS = {".data", ".gsd", ".dump", ".png", ".pdf", ".csv", ".json", ".txt"}
 
 
+class FileFormatError(ValueError):
+    """A file has unexpected content; the message names the file."""
+
+
 @contextmanager
 def replacing(path: PathLike, *, wait: bool = True) -> Iterator[Path]:
     """Yield a temporary path in the folder of `path`, which takes its place if the body succeeds.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 # Elements under /particles/all, some by the fields of a packing.
 RESTS = {"position_rest": "position_rest", "orientation_rest": "orientation_rest"}
 EDGES, EDGES_REST = "box/edges", "box/edges_rest"
+COLUMNS = "columns"
 
 _MATRICES = 3  # dimensions of a dataset (T, D, D)
 
@@ -68,6 +70,27 @@ def frame_values(packing: Packing, form: Form) -> dict[str, NDArray[Any]]:
         values |= {element: getattr(packing, name) for name, element in RESTS.items()}
         values[EDGES_REST] = stored(packing.edges_rest, packing.tilt_rest)
     return values
+
+
+def column_values(frames: Sequence[Packing]) -> dict[str, NDArray[Any]]:
+    """Return the elements (T, N) or (T, N, k) of the columns that all frames have, texts as bytes."""
+
+    def stored(name: str) -> NDArray[Any]:
+        rows = [frame.columns[name] for frame in frames]
+        return np.stack([np.char.encode(x, "utf-8") if x.dtype.kind == "U" else x for x in rows])
+
+    def is_in_all(name: str) -> bool:
+        rows = [frame.columns.get(name) for frame in frames]
+        like = {None if row is None else (row.shape, row.dtype.kind) for row in rows}
+        return len(like) == 1
+
+    names = filter(is_in_all, frames[0].columns)
+    return {f"{COLUMNS}/{name}": stored(name) for name in names}
+
+
+def column_of(stored: NDArray[Any]) -> NDArray[Any]:
+    """Read a column, texts from bytes."""
+    return np.char.decode(stored, "utf-8") if stored.dtype.kind == "S" else stored
 
 
 def lengths_of(edges: FloatArray) -> Lengths:

@@ -16,6 +16,8 @@ r"""Packings and runs as H5MD 1.1 files; a packing is a run with one frame.
         position_rest, orientation_rest, box/edges_rest    low parts of these, as more
         doubles of their shapes, in files of states with extended precision (not
         in H5MD)
+        columns/NAME    {step, time, value (T, N) or (T, N, k)}: other columns of the particles, such as
+                        those of a dump, texts as characters (not in H5MD)
         species, id     (N,)
         diameters       (N, 3), the shape columns of LAMMPS (not in H5MD)
         exponent        (N,), for shapes that have one (not in H5MD)
@@ -51,6 +53,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from jamshape.arrays import FloatArray, IntArray
 from jamshape.checks import require_other_file
 from jamshape.files import layout
 from jamshape.files.content import Content
@@ -70,11 +73,13 @@ __all__ = [
     "copy_run",
     "count_frames",
     "read_attributes",
+    "read_clock",
     "read_creator",
     "read_format_version",
     "read_observables",
     "read_origin",
     "read_packing",
+    "read_packings",
     "read_report",
     "read_series",
     "read_style",
@@ -202,6 +207,27 @@ def read_packing(path: PathLike, frame: int = -1) -> Packing:
     with layout.opened(path) as file:
         n_frames = layout.count(file, "particles/all/position")
         return layout.read_frame(file, row_of(frame, n_frames, path))
+
+
+def read_packings(path: PathLike, frames: Sequence[int]) -> list[Packing]:
+    """Read some frames, counted from 0; errors as `read_packing`."""
+    with layout.opened(path) as file:
+        n_frames = layout.count(file, "particles/all/position")
+        held: list[Any] = []  # open datasets keep their chunks in memory
+        require_item(file, "particles/all").visititems(lambda _, item: held.append(item))
+        return [layout.read_frame(file, row_of(frame, n_frames, path)) for frame in frames]
+
+
+def read_clock(path: PathLike) -> tuple[IntArray, FloatArray]:
+    """Read steps (T,) and times (T,) of the frames; errors as `read_packing`."""
+    with layout.opened(path) as file:
+        element = "particles/all/position"
+        n_frames = layout.count(file, element)
+        step, time = (
+            layout.require_rows(file, element, name, n_frames)[:n_frames]
+            for name in ("step", "time")
+        )
+        return step, time
 
 
 def count_frames(path: PathLike) -> int:

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from jamshape.files.disk import FileFormatError as FileFormatError  # noqa: PLC0414 - passed on
 from jamshape.files.disk import PathLike, store
 from jamshape.files.frames import MissingFrameError
 from jamshape.files.lock import NO_LOCKS
@@ -35,10 +36,6 @@ _ATTRIBUTE_BYTES = 60_000  # HDF5 refused attributes of 64 kB and more in files 
 _GZIP, _SHUFFLE, _FLETCHER = 1, 2, 3  # numbers of HDF5's filters
 _LARGEST_RATIO = 1032  # of deflate
 _SYSTEM = {errno.EIO, errno.ESTALE, errno.EMFILE, errno.ENFILE}  # not about content
-
-
-class FileFormatError(ValueError):
-    """A file has unexpected content; the message names the file."""
 
 
 def hdf5() -> Any:

@@ -17,17 +17,24 @@ hold 2p twice, behind each row of Ellipsoids.
 
 from __future__ import annotations
 
+import contextlib
+import io
 import itertools
+import os
+import re
 import warnings
-from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+import weakref
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, TextIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jamshape.arrays import FloatArray, IntArray
+from jamshape.files.dump_index import index_of
+from jamshape.files.frames import row_of
 from jamshape.files.h5md import FileFormatError, PathLike, read_packing, replacing
 from jamshape.files.meaning import (
     PLANE,
@@ -39,27 +46,45 @@ from jamshape.files.meaning import (
     require_told,
 )
 from jamshape.files.signature import DUMP, GSD, HDF5, REFUSED, format_of
+from jamshape.files.unpacked import opened_plain
 from jamshape.packing import Box, Lengths, Packing, angle_from_quaternion, cuboid_around
+from jamshape.packing.columns import flat, joined
 from jamshape.shapes.shape import Stiffness, stiffness_of, stiffness_text, stiffness_told
 from jamshape.shapes.table import SHAPES
 
 _TITLE = "LAMMPS data file by jamshape"
 _EXPONENT_COMMENT = "exponent="
 _POSITION = ("x", "y", "z")
+# Positions in dumps: wrapped or not, and in units of the box.
+_POSITIONS = (_POSITION, ("xu", "yu", "zu"), ("xs", "ys", "zs"), ("xsu", "ysu", "zsu"))
 _IMAGE = ("ix", "iy", "iz")
 _QUATERNION = ("quatw", "quati", "quatj", "quatk")
 _DIAMETERS = ("shapex", "shapey", "shapez")
 _EXPONENT = ("exponent",)
 _ROUNDNESS = ("SuperquadricRoundness.Phi", "SuperquadricRoundness.Theta")  # OVITO's names
+_WIDTHS = {"diameter": 1.0, "radius": 2.0}  # of discs, over their diameter
+_PROPERTIES = (*_QUATERNION, *_DIAMETERS)  # in the order of a compute property/atom of seven
+# Names of computes of several columns, with the columns.
+_COMPUTES = {
+    **dict.fromkeys(("q", "quat", "quaternion", "orient", "orientation", "body"), _PROPERTIES),
+    **dict.fromkeys(("shape", "diameter", "diameters"), _DIAMETERS),
+}
 _DUMP_COLUMNS = ("id", "type", *_POSITION, *_QUATERNION, *_DIAMETERS)
 _ATOMS = ("id", "type", "ellipsoidflag", "density", *_POSITION)
+_SPHERES = ("id", "type", "diameter", "density", *_POSITION)
 _ELLIPSOIDS = ("id", *_DIAMETERS, *_QUATERNION)
 _BLOCKS = ("block1", "block2")  # 2p each, of atom_style ellipsoid superellipsoid
 _ATOM_STYLE = "ellipsoid"
-# Number of columns behind those of ellipsoids, by other styles in an atom style hybrid.
-_HYBRID = {"atomic": 0, "molecular": 1, "bond": 1, "angle": 1, "charge": 1, "full": 2}
+# Columns behind those of ellipsoids, by other styles in an atom style hybrid.
+_HYBRID = {
+    "atomic": (),
+    **dict.fromkeys(("molecular", "bond", "angle"), ("mol",)),
+    "charge": ("q",),
+    "full": ("mol", "q"),
+}
 _ATOMS_OF_HYBRID = ("id", "type", "x", "y", "z", "ellipsoidflag", "density")
 _PAIRS = {"Pair Coeffs": 1, "PairIJ Coeffs": 2}  # types in a row
+_BOUNDARY = re.compile(r"(xy xz yz )?(pp|[fsm]{2})( (pp|[fsm]{2})){2}")
 _ALIKE = 1e-9  # relative difference of exponents that rounding leaves
 _COUNTED = 200  # rows from which the number of digits is determined
 # TIMESTEP precedes TIME, which is its prefix.
@@ -76,6 +101,9 @@ class _Frame(NamedTuple):
     said: Said = Said()
     step: int = 0
     time: float = 0.0
+    others: Mapping[str, NDArray[Any]] = {}
+    """Columns that are only kept."""
+    boundary: str = "pp pp pp"
 
 
 def write_data(path: PathLike, packing: Packing, density: float = 1.0) -> None:
@@ -117,8 +145,57 @@ def write_data(path: PathLike, packing: Packing, density: float = 1.0) -> None:
         np.savetxt(file, ellipsoids, fmt=row)
 
 
+def write_dump(path: PathLike, packings: Packing | Iterable[Packing]) -> None:
+    """Write a text dump as of ``dump custom`` with ``format float %.17g``; `path` is replaced only when writing is complete.
+
+    Parameters
+    ----------
+    path : path-like
+    packings : Packing or iterable of Packing
+        Frames, with their steps, times and other columns. Shape and law are not in a dump.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    frames = [packings] if isinstance(packings, Packing) else packings
+    with replacing(path) as temporary, temporary.open("w", encoding="utf-8") as file:
+        for packing in frames:
+            _write_frame(file, packing)
+
+
+def _write_frame(file: TextIO, packing: Packing) -> None:
+    lo, hi = (np.array([*ends, z][:3]) for ends, z in zip(packing.box.bounds, PLANE, strict=True))
+    bounds, boundary = np.column_stack([lo, hi]), "pp pp pp"
+    if packing.box.is_tilted:
+        bounds = np.column_stack([bounds, [*packing.box.tilt.tolist(), 0.0, 0.0][:3]])
+        boundary = f"xy xz yz {boundary}"
+    columns: dict[str, NDArray[Any]] = {"id": packing.id, "type": packing.species}
+    columns |= dict(zip(_POSITION, _padded(packing.position).T, strict=True))
+    columns |= dict(zip(_IMAGE, _padded(packing.image).astype(np.int64).T, strict=True))
+    columns |= dict(zip(_PROPERTIES, [*packing.quaternions.T, *packing.diameters.T], strict=True))
+    if packing.shape.has_exponent:
+        columns |= {"exponent": packing.exponent, **dict.fromkeys(_ROUNDNESS, 1 / packing.exponent)}
+    columns = flat(packing.columns) | columns
+    columns = {name: columns[name] for name in sorted(columns, key=_place_in_row)}
+    file.write(f"ITEM: TIME\n{packing.time:.17g}\n" if packing.time else "")
+    file.write(f"ITEM: TIMESTEP\n{packing.step}\nITEM: NUMBER OF ATOMS\n{packing.n}\n")
+    file.write(f"ITEM: BOX BOUNDS {boundary}\n")
+    np.savetxt(file, bounds, fmt="%.17g")
+    file.write(f"ITEM: ATOMS {' '.join(columns)}\n")
+    formats = {"f": "{:.17g}", "U": "{}"}
+    texts = [map(formats.get(x.dtype.kind, "{:d}").format, x.tolist()) for x in columns.values()]
+    file.writelines(" ".join(row) + "\n" for row in zip(*texts, strict=True))
+
+
+def _place_in_row(name: str) -> int:
+    known = ("id", "type", *_POSITION, *_IMAGE, *_PROPERTIES, *_EXPONENT, *_ROUNDNESS)
+    return known.index(name) if name in known else len(known)
+
+
 def read_data(path: PathLike, dimension: int | None = None, shape: str | None = None) -> Packing:
-    """Read a data file of ``atom_style ellipsoid``, ours or from LAMMPS's ``write_data``.
+    """Read a data file of ``atom_style ellipsoid`` or ``sphere``, ours or from LAMMPS's ``write_data``.
 
     Parameters
     ----------
@@ -143,7 +220,8 @@ def read_data(path: PathLike, dimension: int | None = None, shape: str | None = 
     OSError
         If the file cannot be opened.
     """
-    text = Path(path).read_text(encoding="utf-8", errors="replace")
+    with opened_plain(path) as file:
+        text = file.read().decode(errors="replace").replace("\r\n", "\n")
     try:
         return _packing(path, _data_frame(text), Wanted(dimension, shape))
     except ValueError as error:
@@ -151,54 +229,73 @@ def read_data(path: PathLike, dimension: int | None = None, shape: str | None = 
         raise FileFormatError(msg) from error
 
 
-def iter_dump(
-    path: PathLike, dimension: int | None = None, shape: str | None = None
-) -> Iterator[Packing]:
-    """Read the frames of a text dump one by one.
+class DumpFile:
+    """The frames of a text dump, read one by one by their offsets in the file, which stays open.
 
     Parameters
     ----------
     path : path-like
-        A ``dump custom`` with the columns ``id type x y z quatw quati quatj quatk shapex shapey
-        shapez`` in any order, optionally ``ix iy iz`` and ``exponent``, and others, which are ignored.
-        Quaternions and shapes may come from a compute of their name, ``compute quatw all
-        property/atom quatw`` and the column ``c_quatw``, and so on; the exponent from a variable.
-        Without it, p is 1 over ``SuperquadricRoundness.Phi``, if present.
+        A ``dump custom`` with the columns ``id type x y z quatw quati quatj quatk shapex shapey shapez`` in any
+        order, or positions ``xu yu zu``, ``xs ys zs`` or ``xsu ysu zsu``, optionally ``ix iy iz`` and
+        ``exponent``; others are kept. Quaternions and shapes may come from a compute of their name, ``compute
+        quatw all property/atom quatw`` and the column ``c_quatw``, and so on, or of several columns, ``c_q[1]``
+        to ``c_q[4]`` and ``c_shape[1]`` to ``c_shape[3]``; the exponent from a variable. Without it, p is 1 over
+        ``SuperquadricRoundness.Phi``, if present. Discs and spheres may have a ``diameter`` or ``radius`` alone.
     dimension, shape
         See `read_data`; those of the first frame apply to all.
-
-    Yields
-    ------
-    Packing
-        Rows in the order of the IDs; time 0 unless ``dump_modify time yes`` wrote it.
 
     Raises
     ------
     FileFormatError
-        If a frame is truncated or not of such a dump; earlier frames are yielded before.
+        If it is compressed and damaged.
     OSError
-        If the file cannot be opened.
+        If it cannot be opened.
     """
-    wanted = Wanted(dimension, shape)
-    with Path(path).open(encoding="utf-8", errors="replace") as lines:
-        for number in itertools.count():
-            title = lines.readline()
-            if not title:
-                return
-            try:
-                packing = _packing(path, _dump_frame(title, lines, is_first=not number), wanted)
-            except ValueError as error:
-                msg = f"{path}: frame {number}: {error}"
-                raise FileFormatError(msg) from error
-            wanted = Wanted(packing.dimension, packing.shape_style)
-            yield packing
 
+    def __init__(
+        self, path: PathLike, dimension: int | None = None, shape: str | None = None
+    ) -> None:
+        self.path = Path(path)
+        self._wanted = Wanted(dimension, shape)
+        self._is_told = False
+        self._file = opened_plain(path)
+        weakref.finalize(self, self._file.close)
+        self.index = index_of(self._file)
 
-def read_dump(
-    path: PathLike, dimension: int | None = None, shape: str | None = None
-) -> list[Packing]:
-    """Read all frames of a text dump; see `iter_dump`."""
-    return list(iter_dump(path, dimension, shape))
+    def __reduce__(self) -> Any:
+        return DumpFile, (self.path, *self._wanted)
+
+    def __len__(self) -> int:
+        """Count the complete frames."""
+        return self.index.n_whole
+
+    def warn_if_cut(self) -> None:
+        """Warn that an incomplete last frame is left out."""
+        if self.index.is_cut and len(self):
+            said = f"{self.path}: the file ends within frame {len(self)}, which is left out; the frames before are complete"
+            warnings.warn(said, stacklevel=4)
+
+    def packing(self, frame: int) -> Packing:
+        """Read a frame, counted from 0, with its particles in the order of their IDs.
+
+        Raises
+        ------
+        FileFormatError
+            If it is truncated or not of such a dump.
+        """
+        if frame and not self._is_told:
+            self.packing(0)
+        start, end = self.index.starts[frame : frame + 2]
+        text = io.BytesIO(os.pread(self._file.fileno(), end - start, start))
+        lines = io.TextIOWrapper(text, encoding="utf-8", errors="replace")
+        try:
+            read = _dump_frame(lines, is_first=not self._is_told)
+            packing = _packing(self.path, read, self._wanted)
+        except ValueError as error:
+            msg = f"{self.path}: frame {frame}: {error}"
+            raise FileFormatError(msg) from error
+        self._wanted, self._is_told = Wanted(packing.dimension, packing.shape_style), True
+        return packing
 
 
 def read_any(
@@ -234,19 +331,15 @@ def read_any(
         packing = read_packing(path, frame)
         require_told(path, packing, Wanted(dimension, shape))
         return packing
-    if found_format == DUMP:
-        frames = iter_dump(path, dimension, shape)
-    else:
-        frames = iter([read_data(path, dimension, shape)])
-    if frame >= 0:
-        found = list(itertools.islice(frames, frame, frame + 1))
-    else:
-        last = deque(frames, maxlen=-frame)
-        found = [last[0]] if len(last) == -frame else []
-    if not found:
-        msg = f"{path}: has no frame {frame}, expected one from the file"
-        raise ValueError(msg)
-    return found[0]
+    if found_format != DUMP:
+        row_of(frame, 1, path)
+        return read_data(path, dimension, shape)
+    dump = DumpFile(path, dimension, shape)
+    if not len(dump):
+        return dump.packing(0)  # raises
+    if frame < 0:
+        dump.warn_if_cut()
+    return dump.packing(row_of(frame, len(dump), path))
 
 
 def _padded(vectors: FloatArray | IntArray) -> FloatArray:
@@ -295,7 +388,7 @@ def _packing(path: PathLike, frame: _Frame, wanted: Wanted) -> Packing:
     quaternion = meaning.turned(quaternion)
     lo, hi = frame.bounds[:dimension].T
     has_image = set(_IMAGE) <= set(frame.columns)
-    return Packing(
+    packing = Packing(
         position=there.position[:, :dimension],
         orientation=angle_from_quaternion(quaternion) if dimension == 2 else quaternion,
         diameters=shape.diameters,
@@ -308,7 +401,70 @@ def _packing(path: PathLike, frame: _Frame, wanted: Wanted) -> Packing:
         law=law,
         step=frame.step,
         time=frame.time,
+        columns=frame.others,
     )
+    _require_closed(path, packing, frame)
+    return packing
+
+
+def packing_of_columns(
+    name: str,
+    columns: dict[str, FloatArray],
+    box: tuple[tuple[FloatArray, FloatArray], str],
+    pair: str,
+    wanted: Wanted,
+) -> Packing:
+    """Make a packing from what a dump has.
+
+    Parameters
+    ----------
+    name : str
+        Name of the source in messages.
+    columns : dict of str to (N,) array
+    box : (bounds, tilt), boundary
+        As in a dump.
+    pair : str
+        Name and settings of a pair style of ours on one line, then its coefficients, a line for each pair of types; "" for
+        others.
+    wanted : Wanted
+
+    Raises
+    ------
+    ValueError
+        If they are not those of a packing.
+    """
+    said = Said()
+    style, *rows = pair.splitlines() or [""]
+    shape = style.partition("/")[0]
+    if shape in SHAPES:
+        said = _of_pairs(shape, [row.split() for row in rows], 2, columns)
+        sides = {"sides": 1 if style.endswith("sides one") else 2}
+        said = replace(said, law={**said.law, **sides})
+    (bounds, tilt), boundary = box
+    return _packing(name, _Frame(columns, bounds, tilt, said, boundary=boundary), wanted)
+
+
+def _require_closed(path: PathLike, packing: Packing, frame: _Frame) -> None:
+    """Refuse open boundaries that a particle could reach across; a periodic box has the same contacts otherwise."""
+    ends = frame.boundary.split()[-3:][: packing.dimension]
+    is_open = np.array([end != "pp" for end in ends])
+    if not is_open.any():
+        return
+    heights = packing.box.heights(packing.position - packing.box.lo)
+    gap = (packing.box.spacings - np.ptp(heights, axis=0))[is_open].min()
+    widest = 2 * packing.outer_radius.max()
+    if gap <= widest:
+        msg = (
+            f"box bounds are {frame.boundary!r} with a gap of {gap:.3g} between the particles and their images, expected"
+            f" periodic ones (pp), or a gap above the largest diameter, {widest:.3g}; widen the box (change_box)"
+        )
+        raise ValueError(msg)
+    if not frame.said.is_later:
+        said = (
+            f"{path} has the box bounds {frame.boundary!r}: it is read as periodic, with the same contacts, since no"
+            " particle reaches across; forces of walls are not in it"
+        )
+        warnings.warn(said, stacklevel=2)
 
 
 def _exponent(columns: Mapping[str, FloatArray]) -> FloatArray:
@@ -359,18 +515,35 @@ def _data_frame(text: str) -> _Frame:
         msg = "the header has no line 'N atoms', expected a LAMMPS data file"
         raise ValueError(msg)
     n = int(header["atoms"][0])
-    atom_rows, ellipsoid_rows = (_section(sections, name, n) for name in ("Atoms", "Ellipsoids"))
-    atom_rows = _numbered(atom_rows, sections.get("Atom Type Labels"))
+    atom_rows = _numbered(_section(sections, "Atoms", n), sections.get("Atom Type Labels"))
     names = _atom_columns(sections["Atoms"].title, len(atom_rows[0].split()))
-    atoms = _columns(atom_rows, names, [name for name in names if name])
-    _require_ellipsoids(atoms)
-    ellipsoids = _ellipsoids(ellipsoid_rows, sections["Ellipsoids"].comments)
-    if not np.array_equal(atoms["id"], ellipsoids["id"]):
-        msg = "Atoms and Ellipsoids hold different ids, expected one ellipsoid for each atom"
+    columns = _columns(atom_rows, names, names)
+    if "diameter" in columns:
+        columns |= _round(columns)
+    else:
+        _require_ellipsoids(columns)
+        rows = _section(sections, "Ellipsoids", n)
+        ellipsoids = _ellipsoids(rows, sections["Ellipsoids"].comments)
+        if not np.array_equal(columns["id"], ellipsoids["id"]):
+            msg = "Atoms and Ellipsoids hold different ids, expected one ellipsoid for each atom"
+            raise ValueError(msg)
+        columns |= ellipsoids
+    said = replace(_said(text, sections, columns), digits=_digits(atom_rows, names))
+    others: dict[str, NDArray[Any]] = {"q": columns["q"]} if "q" in columns else {}
+    others |= {"mol": _whole(columns["mol"])} if "mol" in columns else {}
+    return _Frame(columns, *_bounds(header), said, others=others)
+
+
+def _round(columns: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Return diameters and quaternions of discs from a column of their widths."""
+    name = next(name for name in _WIDTHS if name in columns)
+    width = _WIDTHS[name] * columns[name]
+    if not (width > 0).all():
+        msg = f"{name} holds {columns[name].min():g}, expected particles of positive widths, no points"
         raise ValueError(msg)
-    columns = {**atoms, **ellipsoids}
-    said = _said(text, sections, columns)
-    return _Frame(columns, *_bounds(header), replace(said, digits=_digits(atom_rows, names)))
+    zero = np.zeros(len(width))
+    quaternion = zip(_QUATERNION, (zero + 1, zero, zero, zero), strict=True)
+    return dict.fromkeys(_DIAMETERS, width) | dict(quaternion)
 
 
 class _Section(NamedTuple):
@@ -408,17 +581,18 @@ def _numbered(rows: list[str], labels: _Section | None) -> list[str]:
 
 
 def _atom_columns(title: str, count: int) -> tuple[str, ...]:
-    """Name the columns of Atoms by the atom style in its title; "" for unneeded ones."""
+    """Name the columns of Atoms by the atom style in its title."""
     style, *others = title.split() or [_ATOM_STYLE]
-    if style == _ATOM_STYLE:
-        return _ATOMS if count == len(_ATOMS) else (*_ATOMS, *_IMAGE)
-    what = "expected atoms of style ellipsoid; write the file from LAMMPS with atom_style ellipsoid"
+    if style in {_ATOM_STYLE, "sphere"}:
+        names = _ATOMS if style == _ATOM_STYLE else _SPHERES
+        return names if count == len(names) else (*names, *_IMAGE)
+    what = "expected atoms of style ellipsoid or sphere; write the file from LAMMPS with atom_style ellipsoid"
     if style != "hybrid":
         msg = f"the section is titled 'Atoms # {title}', {what}"
         raise ValueError(msg)
     known = others[:1] == [_ATOM_STYLE] and set(others[1:]) <= set(_HYBRID)
-    more = sum(_HYBRID[name] for name in others[1:]) if known else 0
-    plain = (*_ATOMS_OF_HYBRID, *[""] * more)
+    more = [column for name in others[1:] for column in _HYBRID[name]] if known else []
+    plain = (*_ATOMS_OF_HYBRID, *more)
     if not known or count not in {len(plain), len(plain) + len(_IMAGE)}:
         msg = (
             f"the section is titled 'Atoms # {title}', which does not define its {count} columns, {what}, or"
@@ -522,9 +696,9 @@ def _stiffness(rows: Sequence[Sequence[str]], n_types: int) -> Stiffness:
     return stiffness_of([[found[min(i, j), max(i, j)] for j in types] for i in types])
 
 
-def _digits(rows: Sequence[str], names: Sequence[str]) -> int:
+def _digits(rows: Sequence[str], names: Sequence[str], place: Sequence[str] = _POSITION) -> int:
     """Count the digits of coordinates in the first rows."""
-    places = [names.index(name) for name in _POSITION]
+    places = [names.index(name) for name in place]
     return most_digits([row.split()[k] for row in rows[:_COUNTED] for k in places])
 
 
@@ -558,8 +732,9 @@ def _bounds(header: Mapping[str, list[str]]) -> tuple[FloatArray, FloatArray]:
     return np.array(bounds, dtype=np.float64), np.array(tilt, dtype=np.float64)
 
 
-def _dump_frame(title: str, lines: TextIO, *, is_first: bool) -> _Frame:
+def _dump_frame(lines: TextIO, *, is_first: bool) -> _Frame:
     items: dict[str, list[str]] = {}
+    title = lines.readline()
     while not title.startswith("ITEM: ATOMS "):
         keyword = next((k for k in _ITEM_ROWS if title.startswith(f"ITEM: {k}")), None)
         if keyword is None:
@@ -573,17 +748,55 @@ def _dump_frame(title: str, lines: TextIO, *, is_first: bool) -> _Frame:
         msg = f"items {sorted(missing)} are missing before the atoms, expected an atom dump"
         raise ValueError(msg)
     rows = _take(lines, int(items["NUMBER OF ATOMS"][1]))
-    names = [_plain_name(name) for name in title.split()[2:]]
-    columns = _dump_columns(names, rows)
-    said = Said(digits=_digits(rows, names)) if is_first else Said(is_later=True)
+    if rest := lines.readline().strip():
+        msg = f"a line reads {rest!r}, expected an 'ITEM:' line of an atom dump"
+        raise ValueError(msg)
+    names = _plain_names(title.split()[2:])
+    box = _dump_bounds(items["BOX BOUNDS"])
+    columns, others = _dump_columns(names, rows)
+    place = next(names for names in _POSITIONS if set(names) <= set(columns))
+    said = Said(is_later=True)
+    if is_first:
+        said = Said(digits=_digits(rows, names, place), is_scaled=place in _POSITIONS[2:])
     step, time = int(items["TIMESTEP"][1]), float(items.get("TIME", ["", "0"])[1])
-    return _Frame(columns, *_dump_bounds(items["BOX BOUNDS"]), said, step, time)
+    boundary = items["BOX BOUNDS"][0]
+    return _Frame(_placed(columns, place, box), *box, said, step, time, joined(others), boundary)
 
 
-def _plain_name(column: str) -> str:
-    """Return `quatw` for `c_quatw`, the only possible name in LAMMPS before ``dump_modify colname``."""
-    name = column[2:] if column[:2] in {"c_", "f_", "v_"} else column
-    return name if name in (*_QUATERNION, *_DIAMETERS, *_EXPONENT) else column
+def _placed(
+    columns: dict[str, FloatArray], place: Sequence[str], box: tuple[FloatArray, FloatArray]
+) -> dict[str, FloatArray]:
+    """Return columns with positions ``x y z`` from the columns `place`, and images if these are unwrapped."""
+    if place == _POSITION:
+        return columns
+    bounds, tilt = box
+    of = Box(bounds[:, 0], bounds[:, 1] - bounds[:, 0], tilt)
+    position = np.column_stack([columns[name] for name in place])
+    position = of.lo + of.vectors(position) if place in _POSITIONS[2:] else position
+    found = dict(columns)
+    if place in _POSITIONS[1::2]:
+        _, image = of.wrapped(position)
+        position = np.where(
+            image.any(axis=1, keepdims=True), position - of.vectors(image), position
+        )
+        found |= dict(zip(_IMAGE, image.T.astype(np.float64), strict=True))
+    return found | dict(zip(_POSITION, position.T, strict=True))
+
+
+def _plain_names(columns: Sequence[str]) -> list[str]:
+    """Replace names of computes, the only possible ones before ``dump_modify colname``: `quatw` for `c_quatw` or `c_q[1]`."""
+    found = []
+    for column in columns:
+        name, _, number = column.removeprefix(column[:2]).removesuffix("]").partition("[")
+        of = _COMPUTES.get(name, ())
+        is_ours = column[:2] in {"c_", "f_", "v_"}
+        if is_ours and number.isdecimal() and 0 < int(number) <= len(of):
+            name = of[int(number) - 1]
+        is_known = (
+            not number and name in (*_PROPERTIES, *_EXPONENT, *_WIDTHS)
+        ) or name in _PROPERTIES
+        found.append(name if is_ours and is_known else column)
+    return found
 
 
 def _take(lines: TextIO, n: int) -> list[str]:
@@ -594,19 +807,53 @@ def _take(lines: TextIO, n: int) -> list[str]:
     return rows
 
 
-def _dump_columns(names: Sequence[str], rows: Sequence[str]) -> dict[str, FloatArray]:
-    missing = [name for name in _DUMP_COLUMNS if name not in names]
+def _dump_columns(
+    names: Sequence[str], rows: Sequence[str]
+) -> tuple[dict[str, FloatArray], dict[str, NDArray[Any]]]:
+    """Parse the columns of a frame: those known here, and others."""
+    place = next((own for own in _POSITIONS if set(own) <= set(names)), _POSITION)
+    needed = ["id", "type", *place]
+    if not set(_WIDTHS) & set(names) or set(_PROPERTIES) & set(names):
+        needed += _PROPERTIES
+    missing = [name for name in needed if name not in names]
     if missing:
-        msg = f"columns {' '.join(missing)!r} are missing, expected {' '.join(_DUMP_COLUMNS)!r}"
+        msg = (
+            f"columns {' '.join(missing)!r} are missing, expected {' '.join(_DUMP_COLUMNS)!r}, or such as"
+            " c_q[1] to c_q[4] and c_shape[1] to c_shape[3]"
+        )
         raise ValueError(msg)
-    others = [name for name in (*_IMAGE, *_EXPONENT, *_ROUNDNESS) if name in names]
-    return _columns(rows, names, [*_DUMP_COLUMNS, *others])
+    optional = (*_IMAGE, *_EXPONENT, *_ROUNDNESS, *(() if "shapex" in needed else _WIDTHS))
+    known = _columns(rows, names, [*needed, *(name for name in optional if name in names)])
+    if "shapex" not in known:
+        known |= _round(known)
+    return known, _others(rows, names, set(known))
+
+
+def _others(rows: Sequence[str], names: Sequence[str], known: set[str]) -> dict[str, NDArray[Any]]:
+    """Parse columns of whole numbers, numbers or texts, in the order of the ids."""
+    places = [k for k, name in enumerate(names) if name not in known]
+    if not places:
+        return {}
+    words = [row.split() for row in rows]
+    order = np.argsort(np.array([int(row[names.index("id")]) for row in words]))
+    found: dict[str, NDArray[Any]] = {}
+    for k in places:
+        column = np.array([row[k] for row in words])[order]
+        for kind in (np.int64, np.float64):
+            with contextlib.suppress(ValueError, OverflowError):
+                column = column.astype(kind)
+                break
+        found[names[k]] = column
+    return found
 
 
 def _dump_bounds(item: Sequence[str]) -> tuple[FloatArray, FloatArray]:
     boundary, *rows = item
-    if boundary not in {"pp pp pp", "xy xz yz pp pp pp"}:
-        msg = f"box bounds are {boundary!r}, expected 'pp pp pp', periodic, or 'xy xz yz pp pp pp'"
+    if not _BOUNDARY.fullmatch(boundary):
+        msg = (
+            f"box bounds are {boundary!r}, expected 'pp pp pp' or 'xy xz yz pp pp pp'; write the dump with"
+            " dump_modify triclinic/general no"
+        )
         raise ValueError(msg)
     is_tilted = boundary.startswith("xy")
     columns = np.array([row.split() for row in rows], dtype=np.float64)

@@ -15,7 +15,18 @@ from numpy.typing import NDArray
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.files.disk import PathLike
-from jamshape.files.frames import EDGES, EDGES_REST, RESTS, Form, as_rest, frame_values, lengths_of
+from jamshape.files.frames import (
+    COLUMNS,
+    EDGES,
+    EDGES_REST,
+    RESTS,
+    Form,
+    as_rest,
+    column_of,
+    column_values,
+    frame_values,
+    lengths_of,
+)
 from jamshape.files.hdf5 import (
     FileFormatError,
     Image,
@@ -31,6 +42,7 @@ from jamshape.files.hdf5 import (
 from jamshape.files.origin import origin
 from jamshape.files.vocabulary import FORMAT_VERSION, former
 from jamshape.packing import Box, Packing
+from jamshape.packing.columns import MOST
 from jamshape.shapes.shape import Interaction
 
 if TYPE_CHECKING:
@@ -164,9 +176,10 @@ def write_particles(group: h5py.Group, frames: Sequence[Packing]) -> None:
     clock = group.create_group("position")
     put(clock, "step", np.array([frame.step for frame in frames]))
     put(clock, "time", np.array([frame.time for frame in frames]))
-    for name in rows[0]:
+    elements = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
+    for name, values in (elements | column_values(frames)).items():
         element = group.require_group(name)
-        put(element, "value", np.stack([row[name] for row in rows]))
+        put(element, "value", values)
         if name != "position":
             element["step"], element["time"] = clock["step"], clock["time"]
     group["box"].attrs["dimension"] = first.dimension
@@ -237,6 +250,7 @@ def read_frame(file: h5py.File, frame: int) -> Packing:
         if has_item(file, f"particles/all/{element}"):
             whole = fields[name.removesuffix("_rest")]
             fields[name] = as_rest(row(f"{element}/value", sparse=True), whole)
+    fields["columns"] = _read_columns(file, frame, n)
     fields["shape_style"] = attribute(require_item(file, "particles/all"), "shape_style")
     fields["law"] = _read_law(file)
     fields["step"], fields["time"] = int(row("position/step")), float(row("position/time"))
@@ -251,6 +265,18 @@ def read_frame(file: h5py.File, frame: int) -> Packing:
         raise FileFormatError(msg) from error
     _require_one_size(file, packing)
     return packing
+
+
+def _read_columns(file: h5py.File, frame: int, n: int) -> dict[str, NDArray[Any]]:
+    """Read the other columns of the particles."""
+    group, found = f"particles/all/{COLUMNS}", {}
+    for name in require_item(file, group) if has_item(file, group) else ():
+        values = require_dataset(file, f"{group}/{name}/value", kinds="biufS")
+        if values.shape[1:2] != (n,) or frame >= len(values) or math.prod(values.shape[2:]) > MOST:
+            msg = f"{file.filename}: /{group}/{name} has shape {values.shape}, expected rows of {n} particles"
+            raise FileFormatError(msg)
+        found[name] = column_of(values[frame])
+    return found
 
 
 _MOST_COLUMNS = 4  # numbers of a particle in one array, or of a row of a box

@@ -50,6 +50,8 @@ class Said:
     """Whether the file has exponents."""
     digits: int = 0
     """Largest number of significant digits of a coordinate; 0 if not counted."""
+    is_scaled: bool = False
+    """Whether coordinates are in units of the box."""
     is_ours: bool = False
     """Whether sizes were written by us, exact to the last bit."""
     is_later: bool = False
@@ -171,7 +173,7 @@ def meaning_of(path: PathLike, there: Geometry, said: Said, wanted: Wanted) -> M
             stacklevel=2,
         )
     if _FEW < said.digits < _EXACT:
-        warnings.warn(_of_digits(path, there, said.digits), stacklevel=2)
+        warnings.warn(_of_digits(path, there, said), stacklevel=2)
     return Meaning(dimension, found, law)
 
 
@@ -215,11 +217,12 @@ def _of_shape(path: PathLike, name: str, dimension: int, law: Interaction) -> st
     )
 
 
-def _of_digits(path: PathLike, there: Geometry, digits: int) -> str:
-    largest = float(np.abs(there.position).max())
-    off = 0.5 * 10.0 ** (math.floor(math.log10(largest)) + 1 - digits)
+def _of_digits(path: PathLike, there: Geometry, said: Said) -> str:
+    unit = float(np.ptp(there.bounds, axis=1).max()) if said.is_scaled else 1.0
+    largest = 0.5 if said.is_scaled else float(np.abs(there.position).max())
+    off = unit * 0.5 * 10.0 ** (math.floor(math.log10(largest)) + 1 - said.digits)
     return (
-        f"{path} has coordinates of {digits} digits, with errors up to {off:.1g},"
+        f"{path} has coordinates of {said.digits} digits, with errors up to {off:.1g},"
         f" {off / there.size:.1g} of the smallest diameter: overlaps of that size are lost;"
         " write them with 17 digits (dump_modify ... format float %.17g)"
     )

@@ -12,11 +12,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from jamshape.checks import NotReachedWarning
+from jamshape.files.vocabulary import MINIMISED
 
 AT_REST = ("converged", "kink")
 """Outcomes of minimisations after which forces balance."""
 
-_UNJAMMED = "unjammed"  # of minimisations at a fixed box: nothing touches, so that forces vanish
+_UNJAMMED = "unjammed"
 _SLIDING = "sliding"  # remaining forces lie along sliding modes; they may be below the tolerance
 
 _ADVICE = "{strict}, another {u0:name} or another {seed:name}"
@@ -85,9 +86,9 @@ def warn_unless_reached(known: Mapping[str, Any], stacklevel: int = 2) -> None:
 
 def _is_balanced(known: Mapping[str, Any]) -> bool:
     outcome = known["outcome"]
-    return outcome in (*AT_REST, _UNJAMMED) or (
-        outcome == _SLIDING and _residual(known) <= _tolerance(known)
-    )
+    if outcome == _UNJAMMED and known.get("protocol") == MINIMISED:
+        return True  # nothing touches, so that forces vanish
+    return outcome in AT_REST or (outcome == _SLIDING and _residual(known) <= _tolerance(known))
 
 
 def _n_negative(known: Mapping[str, Any]) -> int:

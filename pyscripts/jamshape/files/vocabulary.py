@@ -21,6 +21,9 @@ _OLD, _PRESSURE = "p", "pressure"
 COMPRESSED, ATHERMAL, THERMAL = "marschall-2018", "yuan-2019-1", "yuan-2019-2"
 """Published protocols, by name."""
 
+MINIMISED = "minimise"
+"""Protocol of a state of one's own that was minimised at its box."""
+
 NUMBERED: Mapping[int, str] = {1: ATHERMAL, 2: THERMAL}
 """Protocols that earlier versions numbered."""
 

@@ -59,11 +59,11 @@ def plan(
         return ImplicitDriver(first, course, Flow(checkpoint["state"], **counts))
 
     is_shear = isinstance(course, SlowShear)
-    what = "a shear" if is_shear else "a compression"
+    name = "shear" if is_shear else "compression"
     arguments = _ARGUMENTS | ({"method": "integrator"} if is_shear else {})
     told = _as_attributes(course) | dict(made_from)
     told["largest_strain"] = told.pop("largest_strain")  # may follow from the others
-    return Plan(what, told, begin, restore, arguments)
+    return Plan(f"slow {name}", f"a {name}", told, begin, restore, arguments)
 
 
 class ImplicitDriver:

@@ -10,10 +10,8 @@ from typing import TYPE_CHECKING, Any
 from jamshape.checks import require_stated
 from jamshape.files.checkpoint import Checkpoint
 from jamshape.flow import motion
-from jamshape.flow.compression import Compression
-from jamshape.flow.cyclic_shear import CyclicShear
 from jamshape.flow.motion import FlowRun, Motion
-from jamshape.flow.shear import Shear, Shearing
+from jamshape.flow.shear import Shearing
 from jamshape.lammps.session import Session
 from jamshape.recording.driver import Plan, Row, Told
 from jamshape.shapes.shape import Interaction
@@ -64,7 +62,7 @@ def plan(
 
     told = dataclasses.asdict(settings) | dict(made_from) | dataclasses.asdict(sizes)
     told["dt"] = told.pop("dt")  # may follow from the others
-    return Plan(f"a {settings.name}", told, begin, restore, _ARGUMENTS)
+    return Plan(settings.name, f"a {settings.name}", told, begin, restore, _ARGUMENTS)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -159,11 +157,3 @@ class LammpsDriver:
     def close(self) -> None:
         """End LAMMPS."""
         self._session.close()
-
-
-def settings_of(stored: Mapping[str, Any]) -> Motion:
-    """Read the settings of a run from the attributes of its file."""
-    kinds: dict[str, type[Motion]] = {"gdot": Shear, "amplitude": CyclicShear}
-    kind = next((kinds[name] for name in kinds if name in stored), Compression)
-    names = {f.name for f in dataclasses.fields(kind)} & set(stored)
-    return kind(**{name: stored[name] for name in names})

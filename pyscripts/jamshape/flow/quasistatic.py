@@ -10,15 +10,16 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from jamshape.arrays import FloatArray, LongArray
 from jamshape.checks import RANGES, require_in, require_one_of, require_positive
 from jamshape.contacts import Contacts
+from jamshape.flow.cyclic_shear import QUARTERS
 from jamshape.flow.host import Host
 from jamshape.flow.shear import FLOWS
 from jamshape.landscape import Landscape, State
@@ -54,13 +55,16 @@ class QuasistaticShear:
     strain_step
         Strain of each step.
     strain_end
-        Final strain.
+        Final strain, of either sign; has no effect on cycles.
     flow
         One of `jamshape.flow.shear.FLOWS`; pure shear by gamma stretches x by exp(gamma).
     hold_pressure
         Pressure to hold, [energy / length^D]; the volume is held by default or if it is 0.
     tolerance
         Largest net force and torque of a particle over the mean bond force.
+    amplitude, cycles
+        Largest strain and number of cycles of a triangle wave, 0 -> amplitude -> -amplitude -> 0, in equal steps of at
+        most `strain_step`; no cycles by default.
 
     Raises
     ------
@@ -74,24 +78,58 @@ class QuasistaticShear:
     flow: str = "simple"
     hold_pressure: float = 0.0
     tolerance: float = 1e-8
+    amplitude: float = 0.0
+    cycles: int = 0
 
     def __post_init__(self) -> None:
+        largest = self.amplitude if self.cycles else abs(self.strain_end)
+        name = "amplitude" if self.cycles else "strain_end"
         require_positive(
-            strain_step=self.strain_step, strain_end=self.strain_end, tolerance=self.tolerance
+            **{"strain_step": self.strain_step, name: largest, "tolerance": self.tolerance}
         )
         if self.hold_pressure != 0:
             require_positive(hold_pressure=self.hold_pressure)
         require_one_of("flow", self.flow, FLOWS)
         if self.flow == "pure":
-            require_in("strain", self.strain_end, RANGES["pure_strain"])
-        if self.strain_step > self.strain_end:
-            msg = f"the step is {self.strain_step:g}, expected at most the final strain, {self.strain_end:g}"
+            require_in("amplitude" if self.cycles else "strain", largest, RANGES["pure_strain"])
+        if self.strain_step > largest:
+            what = "amplitude" if self.cycles else "final strain"
+            msg = f"the step is {self.strain_step:g}, expected at most the {what}, {largest:g}"
             raise ValueError(msg)
+
+    @classmethod
+    def of(cls, stored: Mapping[str, Any]) -> QuasistaticShear:
+        """Read settings from the attributes of a file."""
+        names = [field.name for field in fields(cls) if field.name in stored]
+        return cls(**{name: stored[name] for name in names})
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Settings as attributes: those of one strain, or of cycles."""
+        without = {"strain_end"} if self.cycles else {"amplitude", "cycles"}
+        return {name: value for name, value in asdict(self).items() if name not in without}
 
     @property
     def steps(self) -> int:
         """Number of steps to the end."""
-        return math.ceil(self.strain_end / self.strain_step - 1e-9)
+        if self.cycles:
+            return QUARTERS * self.quarter * self.cycles
+        return math.ceil(abs(self.strain_end) / self.strain_step - 1e-9)
+
+    @property
+    def quarter(self) -> int:
+        """Number of steps from strain 0 to the amplitude."""
+        return math.ceil(self.amplitude / self.strain_step - 1e-9)
+
+    def strain_at(self, steps: int) -> float:
+        """Return the strain after a number of steps; the last one of a strain without cycles may be shorter."""
+        if not self.cycles:
+            size = min(abs(self.strain_end), steps * self.strain_step)
+            return math.copysign(size, self.strain_end)
+        place, quarter = steps % (QUARTERS * self.quarter), self.quarter
+        if place > quarter:  # falls from the amplitude, and rises to 0 again
+            place = max(2 * quarter - place, place - QUARTERS * quarter)
+        return self.amplitude * (place / quarter)
 
     def gradient(self, dimension: int, strain: float) -> LongArray:
         """Return the (D, D) matrix of a shear strain."""
@@ -190,11 +228,9 @@ def shear(landscape: Landscape, run: Sheared, how: QuasistaticShear) -> Iterator
 def advance(landscape: Landscape, run: Sheared, how: QuasistaticShear) -> Row:
     """Minimise the start, or shear by one step and minimise; parameters and errors as `shear`."""
     began, evaluations = time.perf_counter(), landscape.evaluations
-    strain = 0.0 if run.steps < 0 else _strain_of(how, run.steps)
-    state = run.state.deformed(how.gradient(run.state.dimension, strain))
-    # The continuation depends on the state alone, also after reading it from a file.
-    landscape.forget_pairs()
-    found = _minimum(landscape, state.with_least_tilt(), how)
+    done = run.steps
+    strain = 0.0 if done < 0 else how.strain_at(done + 1) - how.strain_at(done)
+    found = sheared(landscape, run.state, how, strain)
     run.state = found.state
     run.steps += 1
     row = _row(landscape, found, run, how)
@@ -205,14 +241,13 @@ def advance(landscape: Landscape, run: Sheared, how: QuasistaticShear) -> Row:
     return row._replace(evaluations=run.evaluations, wall_seconds=run.wall_seconds)
 
 
-def _strain_of(how: QuasistaticShear, done: int) -> float:
-    """Return the strain of the step after `done`; the last one may be shorter."""
-    return min(how.strain_end, (done + 1) * how.strain_step) - done * how.strain_step
-
-
-def _minimum(landscape: Landscape, state: State, how: QuasistaticShear) -> Minimum:
+def sheared(landscape: Landscape, state: State, how: QuasistaticShear, strain: float) -> Minimum:
+    """Strain a state affinely and minimise; errors as `shear`."""
+    deformed = state.deformed(how.gradient(state.dimension, strain)).with_least_tilt()
+    # The continuation depends on the state alone, also after reading it from a file.
+    landscape.forget_pairs()
     stop = Stop(how.tolerance)
-    found = minimise(landscape, state, "auto", stop)
+    found = minimise(landscape, deformed, "auto", stop)
     return _at_pressure(landscape, found, stop, how.hold_pressure) if how.hold_pressure else found
 
 
@@ -261,8 +296,8 @@ def _row(landscape: Landscape, found: Minimum, run: Sheared, how: QuasistaticShe
     u, stress = found.energy_density, how.resisted(tensor)
     order, counts = _order(packing), Contacts.of(packing, landscape.k_e, landscape.sides).counts
     pressure, volume = pressure_of(found), found.state.volume
-    strain = min(how.strain_end, run.steps * how.strain_step)
-    done = strain - min(how.strain_end, max(run.steps - 1, 0) * how.strain_step)
+    strain = how.strain_at(run.steps)
+    done = strain - how.strain_at(max(run.steps - 1, 0))
     given = 0.5 * (run.stress * run.volume + stress * volume) * done
     given += 0.5 * (run.pressure + pressure) * (run.volume - volume)
     lost = (run.u * run.volume + given) / volume - u

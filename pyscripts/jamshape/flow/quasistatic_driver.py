@@ -50,8 +50,8 @@ def plan(
         counts = {name: checkpoint[name] for name in _COUNTS}
         return QuasistaticDriver(first, how, frames, Sheared(checkpoint["state"], **counts))
 
-    settings = dataclasses.asdict(how) | dict(made_from) | {"frames": frames}
-    return Plan("a quasistatic shear", settings, begin, restore, _ARGUMENTS)
+    settings = how.settings | dict(made_from) | {"frames": frames}
+    return Plan("quasistatic shear", "a quasistatic shear", settings, begin, restore, _ARGUMENTS)
 
 
 class QuasistaticDriver:
@@ -81,23 +81,25 @@ class QuasistaticDriver:
 
     def first(self) -> Row:
         """Return the progress at the start."""
-        strain = max(0, self._run.steps) * self._how.strain_step
-        return Row(self._told(strain, f"strain {strain:.4f}"))
+        strain = self._how.strain_at(max(0, self._run.steps))
+        return Row(self._told(f"strain {strain:.4f}"))
 
     def advance(self) -> Row:
         """Minimise the start, or shear by a step and minimise."""
         row = quasistatic.advance(self._landscape, self._run, self._how)
         observables = {name: getattr(row, name) for name in _ROW}
-        text = f"strain {row.strain:.4f} of {self._how.strain_end:g}, stress {row.stress:.2e}, pressure {row.pressure:.2e}"
+        end = f"{self._how.cycles} cycles" if self._how.cycles else f"{self._how.strain_end:g}"
+        text = f"strain {row.strain:.4f} of {end}, stress {row.stress:.2e}, pressure {row.pressure:.2e}"
+        turns = self._how.cycles > 0 and row.step % self._how.quarter == 0
         return Row(
-            self._told(row.strain, text), row.step + 1, row.strain, observables, row.wall_seconds, row.residual,
-            has_frame=row.step % self._per_frame == 0 or self.done,
+            self._told(text), row.step + 1, row.strain, observables, row.wall_seconds, row.residual,
+            has_frame=row.step % self._per_frame == 0 or turns or self.done,
         )  # fmt: skip
 
     def frame(self) -> Packing:
         """Return the present state; its time is the strain."""
         run = self._run
-        strain = min(self._how.strain_end, max(0, run.steps) * self._how.strain_step)
+        strain = self._how.strain_at(max(0, run.steps))
         return dataclasses.replace(run.state.packing(self._first), step=run.steps + 1, time=strain)
 
     def checkpoint(self) -> Checkpoint:
@@ -112,5 +114,5 @@ class QuasistaticDriver:
     def close(self) -> None:
         """Nothing is held outside of Python."""
 
-    def _told(self, strain: float, text: str) -> Told:
-        return Told("quasistatic shear", text, min(1.0, strain / self._how.strain_end))
+    def _told(self, text: str) -> Told:
+        return Told("quasistatic shear", text, max(0, self._run.steps) / self._how.steps)

@@ -23,6 +23,7 @@ from jamshape.flow.implicit import Protocol
 from jamshape.flow.lammps_driver import Sizes
 from jamshape.front.packing import public
 from jamshape.front.progress import place
+from jamshape.front.reading import Held
 from jamshape.front.recorded import recorded
 from jamshape.front.run import RunFile
 from jamshape.front.starts import Asked, Start
@@ -167,7 +168,7 @@ def slow_compress(
     kappa: float | Sequence[tuple[float, float]] = KAPPA_SLOW,
     p_end: float = math.inf,
     seed: int | None = None,
-    start: Packing | str | Path | None = None,
+    start: Held | None = None,
     method: str = "tr-bdf2",
     integration_tolerance: float = 1e-3,
     largest_drop: float = math.inf,
@@ -195,7 +196,7 @@ def slow_compress(
     seed : int, optional
         Random seed of the start; 1 by default.
     start : Packing or path, optional
-        Initial packing, or H5MD file whose last frame to start from.
+        Initial packing, or a file that `load` reads, whose last frame to start from.
     method : {"tr-bdf2", "sdirk2"}
         Method of the implicit steps.
     integration_tolerance : float
@@ -258,7 +259,7 @@ def slow_compress(
 
 def _start_of(
     particles: Particles | None,
-    start: Packing | str | Path | None,
+    start: Held | None,
     phi: tuple[float | None, float],
     **sizes: int | None,
 ) -> Start:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,10 +14,9 @@ from jamshape.arguments import checked
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.checks import require_one_of
 from jamshape.contacts import Contacts, sum_forces
-from jamshape.front.files import packing_of
 from jamshape.front.packing import Packing
+from jamshape.front.reading import Held, packing_of
 from jamshape.landscape import Landscape, State
-from jamshape.packing import Packing as PackingLike
 from jamshape.records import Record
 from jamshape.vibration.hessian import (
     Coordinates,
@@ -190,7 +188,7 @@ class Energy(Record):
 
 @checked
 def energy(
-    packing: PackingLike | str | Path,
+    packing: Held,
     *,
     hessian: bool = False,
     compatibility: bool = False,

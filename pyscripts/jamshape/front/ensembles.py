@@ -8,9 +8,9 @@ from typing import Any
 
 from jamshape.arguments import checked
 from jamshape.checks import require_stated
+from jamshape.front.ensemble_file import EnsembleFile
 from jamshape.front.progress import place
 from jamshape.front.recorded import recorded
-from jamshape.front.run import EnsembleFile
 from jamshape.protocols import ensemble as driver
 from jamshape.protocols.defaults import recipe_for
 from jamshape.recording.workers import cores

@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from jamshape.arguments import checked
-from jamshape.files.h5md import FileFormatError, copy_run, read_attributes, write_packing
-from jamshape.files.lammps_text import read_any, write_data
+from jamshape.files.h5md import copy_run, read_attributes, write_packing, write_run
+from jamshape.files.lammps_text import write_data, write_dump
 from jamshape.files.meaning import Wanted, require_told
-from jamshape.files.signature import GSD, HDF5, format_of
+from jamshape.files.signature import HDF5, format_of
+from jamshape.front.frames import Frames
 from jamshape.front.modes import Modes
-from jamshape.front.packing import Packing, public
-from jamshape.front.run import Recorded, run_file
+from jamshape.front.packing import Packing
+from jamshape.front.reading import packing_of
+from jamshape.front.recorded import KINDS, run_file
+from jamshape.front.run import Recorded
+from jamshape.lammps.living import Living
 from jamshape.packing import Packing as PackingLike
+from jamshape.recording.driver import KIND
 from jamshape.vibration.table import holds_modes
 
 
 @checked
 def load(
-    path: str | Path,
+    path: str | Path | Living,
     frame: int | None = None,
     *,
     dimension: int | None = None,
@@ -31,7 +37,8 @@ def load(
     Parameters
     ----------
     path : path
-        H5MD of a packing or a run, HDF5 of modes, a LAMMPS dump or data file, or a GSD file.
+        H5MD of a packing or a run, HDF5 of modes, a LAMMPS dump or data file, also compressed (``.gz``, ``.zst``), or
+        a GSD file; or a LAMMPS instance of this process, ``lammps.lammps`` or `jamshape.lammps.session.Session`.
     frame : int, optional
         Frame of a run, a dump or a GSD file to return as a packing, counted from 0 or, if negative, from
         the end. By default a whole run, or the last frame of other files.
@@ -62,49 +69,33 @@ def load(
     >>> js.load("packing.h5")
     <Packing of 16 spherocylinders in 2D: phi = 0.8..., pressure = ...e-05, u = 1e-08, z = 5..., rattlers = 0, in packing.h5>
     """
-    path, wanted = Path(path), Wanted(dimension, shape)
-    found = format_of(path)
-    last = -1 if frame is None else frame
-    if found == GSD:
-        from jamshape.exchange.gsd import read_gsd  # noqa: PLC0415 - gsd may be missing
-
-        packing = read_gsd(path, last)
-        require_told(path, packing, wanted)
-        return public(packing, file=path)
-    if found != HDF5:
-        return public(read_any(path, last, *wanted), file=path)
-    if holds_modes(path):
-        return Modes.read(path)
-    if frame is None and "finished" in read_attributes(path):
-        run = run_file(path)
-        require_told(path, run.packing(0), wanted)
-        return run
-    packing = Packing.read(path, last)
-    require_told(path, packing, wanted)
-    return packing
-
-
-def packing_of(thing: PackingLike | str | Path, frame: int = -1, **meaning: Any) -> Packing:
-    """Return a packing, or that of a frame of any file with particles; arguments and errors as of `load`."""
-    if isinstance(thing, PackingLike):
-        return public(thing)
-    found = load(thing, frame, **meaning)
-    if not isinstance(found, Packing):
-        msg = f"{thing} holds modes, expected particles"
-        raise FileFormatError(msg)
-    return found
+    if isinstance(path, Living):
+        if frame is not None:
+            msg = f"frame is {frame}, expected none for a LAMMPS instance, which has one state; leave it out"
+            raise ValueError(msg)
+    else:
+        path = Path(path)
+        if format_of(path) == HDF5:
+            if holds_modes(path):
+                return Modes.read(path)
+            if frame is None and str(read_attributes(path).get(KIND)) in KINDS:
+                run = run_file(path)
+                require_told(path, run.packing(0), Wanted(dimension, shape))
+                return run
+    return packing_of(path, -1 if frame is None else frame, dimension=dimension, shape=shape)
 
 
 @checked
-def save(path: str | Path, thing: PackingLike | Recorded | Modes) -> None:
-    """Write a packing, a run or modes; an existing file is replaced only when writing is complete.
+def save(path: str | Path, thing: PackingLike | Recorded | Frames | Modes) -> None:
+    """Write a packing, a run, frames or modes; an existing file is replaced only when writing is complete.
 
     Parameters
     ----------
     path : path
         The suffix selects the format: ``.h5`` (HDF5, full precision, with results), ``.data`` (LAMMPS data
-        file of one packing, in doubles), ``.gsd`` (HOOMD-blue, OVITO; all frames of a run).
-    thing : Packing, RunFile, ShearFile, QuasistaticShearFile or Modes
+        file of one packing, in doubles), ``.dump`` or ``.lammpstrj`` (LAMMPS dump, in doubles), ``.gsd``
+        (HOOMD-blue, OVITO); these two take all frames of a run.
+    thing : Packing, RunFile, ShearFile, QuasistaticShearFile, Frames or Modes
         A run in ``.h5`` is copied whole; the copy of an unfinished run cannot be resumed.
 
     Raises
@@ -134,6 +125,13 @@ def save(path: str | Path, thing: PackingLike | Recorded | Modes) -> None:
     raise ValueError(msg)
 
 
+def _save_data(path: Path, packing: PackingLike) -> None:
+    if packing.columns:
+        said = f"{path} is a data file, which holds no other columns: {', '.join(packing.columns)} are left out"
+        warnings.warn(said, stacklevel=4)
+    write_data(path, packing)
+
+
 def _save_h5(path: Path, packing: PackingLike) -> None:
     write_packing(path, packing, packing.to_store)
 
@@ -152,10 +150,12 @@ def _save_gsd(path: Path, packings: PackingLike | Recorded) -> None:
     write_gsd(path, packings)
 
 
-_NAMES = {PackingLike: "a packing", Recorded: "a run", Modes: "modes"}
+_NAMES = {PackingLike: "a packing", Recorded: "a run", Modes: "modes", Frames: "frames"}
 _WRITERS: dict[str, dict[type, Callable[[Path, Any], None]]] = {
-    ".h5": {PackingLike: _save_h5, Recorded: _save_run, Modes: _save_modes},
-    ".data": {PackingLike: write_data},
-    ".gsd": {PackingLike: _save_gsd, Recorded: _save_gsd},
+    ".h5": {PackingLike: _save_h5, Recorded: _save_run, Modes: _save_modes, Frames: write_run},
+    ".data": {PackingLike: _save_data},
+    ".gsd": {PackingLike: _save_gsd, Recorded: _save_gsd, Frames: _save_gsd},
+    ".dump": {PackingLike: write_dump, Recorded: write_dump, Frames: write_dump},
+    ".lammpstrj": {PackingLike: write_dump, Recorded: write_dump, Frames: write_dump},
 }
 """Content and writer, by suffix."""

@@ -6,19 +6,18 @@ from pathlib import Path
 
 from jamshape.arguments import checked
 from jamshape.checks import RANGES, require_stated
-from jamshape.front.files import packing_of
 from jamshape.front.making import made_or_kept
 from jamshape.front.packing import Packing
+from jamshape.front.reading import Held, packing_of
 from jamshape.front.starts import digest, told_of
 from jamshape.minima.target import FixedBox
-from jamshape.packing import Packing as PackingLike
 from jamshape.protocols.recipe import Given, Recipe
 from jamshape.shapes.particles import Particles
 
 
 @checked
 def minimise(
-    packing: PackingLike | str | Path,
+    packing: Held,
     *,
     tolerance: float = 1e-8,
     minimiser: str = "auto",
@@ -96,8 +95,9 @@ def minimise(
 
 
 def _made_from(state: Packing) -> dict[str, object]:
-    """Describe the state, and tell it from others."""
-    return told_of(state) | {"start_digest": digest(state)}
+    """Describe the state, and tell it from others, wherever its file lies."""
+    name = state.file.name if state.file else "packing"
+    return told_of(state) | {"start": name, "start_digest": digest(state)}
 
 
 def _recipe(state: Packing, way: Given, *, strict: bool) -> Recipe:

@@ -12,9 +12,9 @@ from jamshape.arrays import FloatArray, IntArray
 from jamshape.checks import Range, require_in, require_no_effect, require_one_of, require_other_file
 from jamshape.files.disk import require_hdf5_name, settled
 from jamshape.files.outcomes import warn_unless_reached
-from jamshape.front.packing import Packing, public
+from jamshape.front.packing import Packing
+from jamshape.front.reading import Held, packing_of
 from jamshape.landscape import Landscape, State
-from jamshape.packing import Packing as PackingLike
 from jamshape.vibration.elasticity import Moduli
 from jamshape.vibration.ensembles import TOLD, to_store
 from jamshape.vibration.hessian import DynamicalMatrix, DynamicalMatrixOptions, dynamical_matrix
@@ -204,7 +204,7 @@ def require_modes_file(out: Path, read: Sequence[Path] = ()) -> None:
 
 @checked
 def modes(
-    packing: PackingLike | str | Path,
+    packing: Held,
     *,
     lowest: int | None = None,
     near: float | None = None,
@@ -218,7 +218,8 @@ def modes(
     Parameters
     ----------
     packing : Packing or path
-        Packing or H5MD file, at a minimum of its energy, as from `make_packing`; its law stays.
+        Packing at a minimum of its energy, as from `make_packing` or `minimise`, or anything that `load` reads, of which the
+        last frame is taken; its law stays.
     lowest : int, optional
         Number of softest modes to find, by a sparse method; all by default. Translations are
         added, flagged, as in the whole spectrum.
@@ -274,9 +275,7 @@ def modes(
     if method != _SPARSE:
         require_no_effect("lowest", lowest, method=method)
         require_no_effect("near", near, method=method)
-    if not isinstance(packing, PackingLike):
-        packing = Packing.read(Path(packing))
-    measured = public(packing)
+    measured = packing_of(packing)
     if not force and not measured.reached:
         warn_unless_reached(measured.results)
     landscape, state = Landscape(measured), State.of(measured)

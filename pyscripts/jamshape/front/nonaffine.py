@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from jamshape.arguments import checked
 from jamshape.checks import Range, require_in
-from jamshape.front.files import packing_of
+from jamshape.front.reading import Held, packing_of
 from jamshape.measures.nonaffine import Nonaffine, nonaffine_motion
-from jamshape.packing import Packing
 
 _NEIGHBOURS = Range(1e-12, 1e12, "a distance")
 
 
 @checked
-def nonaffine(
-    first: Packing | str | Path, second: Packing | str | Path, *, neighbours: float | None = None
-) -> Nonaffine:
+def nonaffine(first: Held, second: Held, *, neighbours: float | None = None) -> Nonaffine:
     """Measure displacements beside the affine map of the box, and D2_min (Falk & Langer 1998).
 
     Parameters

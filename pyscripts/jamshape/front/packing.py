@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from jamshape.front.modes import Modes
+    from jamshape.lammps.living import Living
 
 
 @checked_fields
@@ -307,6 +308,25 @@ class Packing(PackingLike):
         from jamshape.exchange.gsd import write_gsd  # noqa: PLC0415 - gsd may be missing
 
         write_gsd(path, self)
+
+    def to_lammps(self, lmp: Living) -> None:
+        """Set positions, orientations, images and box of the same particles, by their IDs, in a LAMMPS instance.
+
+        Parameters
+        ----------
+        lmp : lammps.lammps or Session
+            An instance in this process, such as the one that the packing was loaded from.
+
+        Raises
+        ------
+        ValueError
+            If it has other particles, or several processes.
+        LammpsError
+            If LAMMPS refuses the box.
+        """
+        from jamshape.lammps.living import write_living  # noqa: PLC0415 - LAMMPS may be missing
+
+        write_living(self, lmp)
 
     def to_freud(self) -> Any:
         """Return arguments of freud's functions; see `jamshape.exchange.freud.to_freud`."""

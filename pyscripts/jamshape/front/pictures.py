@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from jamshape.arguments import ArgumentTypeError, checked
 from jamshape.checks import ArgumentError, said
+from jamshape.drawing.ladder import Rungs, draw_rungs
 from jamshape.drawing.modes import draw_density
 from jamshape.drawing.packing import Look, add_legend, colorings, draw_packing
 from jamshape.drawing.pictures import title_of
@@ -17,11 +18,12 @@ from jamshape.drawing.shear import Cycles, draw_cycles, draw_steps, draw_stress
 from jamshape.drawing.text import attribute_text, systems_text
 from jamshape.files.ensembles import system_of
 from jamshape.files.h5md import read_style
+from jamshape.front.ensemble_file import EnsembleFile
 from jamshape.front.modes import Modes
 from jamshape.front.packing import public
 from jamshape.front.run import (
     CyclicShearFile,
-    EnsembleFile,
+    LadderFile,
     QuasistaticShearFile,
     Recorded,
     RunFile,
@@ -48,7 +50,7 @@ def plot(
 
     Parameters
     ----------
-    thing : Packing, RunFile, ShearFile, CyclicShearFile, QuasistaticShearFile, EnsembleFile or Modes
+    thing : Packing, RunFile, ShearFile, CyclicShearFile, QuasistaticShearFile, LadderFile, EnsembleFile or Modes
     axes : matplotlib Axes, optional
         Axes without a projection, for packings in space too; by default a new figure of
         `matplotlib.pyplot`.
@@ -156,7 +158,11 @@ def _cyclic(run: CyclicShearFile, axes: Axes, color: str) -> None:
 
 def _quasistatic(run: QuasistaticShearFile, axes: Axes, color: str) -> None:
     del color
-    draw_steps(axes, run.observables, system_of(run.about, *read_style(run.file)))
+    who = system_of(run.about, *read_style(run.file))
+    if run.cycles:
+        draw_cycles(axes, Cycles(run.strain, run.stress, run.steps_per_cycle), who)
+        return
+    draw_steps(axes, run.observables, who)
 
 
 def _ensemble(table: EnsembleFile, axes: Axes, color: str) -> None:
@@ -167,6 +173,12 @@ def _ensemble(table: EnsembleFile, axes: Axes, color: str) -> None:
     told = ", ".join(attribute_text(name, table.about) for name in ("n", "u0"))
     who = systems_text([system_of(table.about, *read_style(table.file))])
     axes.set_title(f"{who}\n{told}, {len(phi)} of {len(table)} samples", fontsize=9)
+
+
+def _ladder(run: LadderFile, axes: Axes, color: str) -> None:
+    del color
+    rungs = Rungs(run.values, run["z"], run.opened, run.closed)
+    draw_rungs(axes, rungs, system_of(run.about, *read_style(run.file)))
 
 
 def _modes(modes: Modes, axes: Axes, color: str) -> None:
@@ -183,5 +195,6 @@ _DRAWN: dict[type, Callable[[Any, Axes, str], None]] = {
     ShearFile: _shear,
     CyclicShearFile: _cyclic,
     QuasistaticShearFile: _quasistatic,
+    LadderFile: _ladder,
     Modes: _modes,
 }

@@ -3,21 +3,47 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from jamshape.arguments import checked
 from jamshape.checks import require_given, require_path
 from jamshape.files.h5md import FileFormatError, read_attributes
 from jamshape.flow import cyclic_driver, implicit_driver, lammps_driver, quasistatic_driver
+from jamshape.flow.compression import Compression
 from jamshape.flow.cyclic_shear import CyclicShear
+from jamshape.flow.motion import Motion
 from jamshape.flow.quasistatic import QuasistaticShear
+from jamshape.flow.shear import Shear
+from jamshape.front.ensemble_file import EnsembleFile
 from jamshape.front.progress import display
-from jamshape.front.run import Recorded, run_file
+from jamshape.front.run import (
+    CyclicShearFile,
+    LadderFile,
+    QuasistaticShearFile,
+    Recorded,
+    RunFile,
+    ShearFile,
+)
 from jamshape.packing import Packing
-from jamshape.recording.driver import Plan
+from jamshape.protocols import ladder
+from jamshape.protocols.approach import FOR_A_PACKING
+from jamshape.protocols.ensemble import ENSEMBLE
+from jamshape.protocols.ladder import Ladder
+from jamshape.protocols.make import MAKING
+from jamshape.recording.driver import KIND, Plan
 from jamshape.recording.recorder import How, record
+
+
+class Kind(NamedTuple):
+    """A kind of files of runs."""
+
+    opens: type[Recorded]
+    """Class of the run."""
+    plan_of: Callable[[Mapping[str, Any]], Plan] | None = None
+    """Makes a plan from the attributes of a file; None if they do not tell all, as of parts of a packing and of ensembles."""
 
 
 def recorded(path: Path, plan: Plan, *, again: bool, seconds: float | None, progress: bool) -> None:
@@ -36,13 +62,13 @@ def resume(file: str | Path, *, seconds: float | None = None, progress: bool = T
     Parameters
     ----------
     file : path
-        File of `compress`, `slow_compress`, `shear`, `cyclic_shear` or `quasistatic_shear`.
+        File of `compress`, `slow_compress`, `shear`, `cyclic_shear`, `quasistatic_shear` or `ladder`.
     seconds, progress
         See `compress`.
 
     Returns
     -------
-    RunFile, ShearFile, CyclicShearFile or QuasistaticShearFile
+    RunFile, ShearFile, CyclicShearFile, QuasistaticShearFile or LadderFile
 
     Raises
     ------
@@ -64,33 +90,80 @@ def resume(file: str | Path, *, seconds: float | None = None, progress: bool = T
     True
     """
     path = Path(file)
-    plan = _plan_of(path, read_attributes(path))
+    plan_of = kind_of(path).plan_of
+    if plan_of is None:
+        kind = read_attributes(path)[KIND]
+        msg = f"{path} is of the kind {kind}, expected a run that its file describes alone; repeat the call that began it"
+        raise FileFormatError(msg)
+    plan = dataclasses.replace(plan_of(read_attributes(path)), settings={})
     recorded(path, plan, again=False, seconds=seconds, progress=progress)
     return run_file(path)
 
 
-def _plan_of(path: Path, stored: Mapping[str, Any]) -> Plan:
-    """Return the plan of the run in a file, which has its own settings."""
-    if "flow_steps" in stored:
-        plan = implicit_driver.plan(_no_start, implicit_driver.course_of(stored), {})
-    elif "shear_steps" in stored:
-        names = [field.name for field in dataclasses.fields(QuasistaticShear)]
-        how = QuasistaticShear(**{name: stored[name] for name in names})
-        plan = quasistatic_driver.plan(_no_start, how, int(stored["frames"]), {})
-    elif {"finished", "rows", "frames"} <= stored.keys():
-        sizes = lammps_driver.Sizes(int(stored["rows"]), int(stored["frames"]))
-        settings = lammps_driver.settings_of(stored)
-        of = cyclic_driver if isinstance(settings, CyclicShear) else lammps_driver
-        plan = of.plan(_no_start, settings, sizes, {})
-    else:
-        msg = (
-            f"{path} holds no run, expected a file of compress, slow_compress, shear, cyclic_shear or"
-            " quasistatic_shear"
-        )
-        raise FileFormatError(msg)
-    return dataclasses.replace(plan, settings={})
+def run_file(path: Path, folder: Any = None) -> Recorded:
+    """Open a run's file as the class of its kind; errors as `kind_of`."""
+    return kind_of(path).opens(path, folder)
+
+
+def kind_of(path: Path) -> Kind:
+    """Look up the kind of a run in a file.
+
+    Raises
+    ------
+    FileFormatError
+        If it holds none.
+    """
+    if kind := KINDS.get(str(read_attributes(path).get(KIND))):
+        return kind
+    msg = (
+        f"{path} holds no run, expected a file of compress, slow_compress, shear, cyclic_shear,"
+        " quasistatic_shear or ladder"
+    )
+    raise FileFormatError(msg)
 
 
 def _no_start() -> Packing:
     """Stand for a start that is in the file."""
     raise AssertionError
+
+
+def _plan_in_lammps(kind: type[Motion], stored: Mapping[str, Any]) -> Plan:
+    sizes = lammps_driver.Sizes(int(stored["rows"]), int(stored["frames"]))
+    settings = _of_fields(kind, stored)
+    if kind is CyclicShear:
+        return cyclic_driver.plan(_no_start, settings, sizes, {})
+    return lammps_driver.plan(_no_start, settings, sizes, {})
+
+
+def _plan_implicit(stored: Mapping[str, Any]) -> Plan:
+    return implicit_driver.plan(_no_start, implicit_driver.course_of(stored), {})
+
+
+def _plan_quasistatic(stored: Mapping[str, Any]) -> Plan:
+    how = QuasistaticShear.of(stored)
+    return quasistatic_driver.plan(_no_start, how, int(stored["frames"]), {})
+
+
+def _plan_ladder(stored: Mapping[str, Any]) -> Plan:
+    return ladder.plan(_no_start, Ladder.of(stored), {})
+
+
+def _of_fields(kind: type[Any], stored: Mapping[str, Any]) -> Any:
+    """Make settings from the attributes of their names."""
+    names = {field.name for field in dataclasses.fields(kind)} & stored.keys()
+    return kind(**{name: stored[name] for name in names})
+
+
+KINDS: dict[str, Kind] = {
+    "compression": Kind(RunFile, partial(_plan_in_lammps, Compression)),
+    "shear": Kind(ShearFile, partial(_plan_in_lammps, Shear)),
+    "cyclic shear": Kind(CyclicShearFile, partial(_plan_in_lammps, CyclicShear)),
+    "slow compression": Kind(RunFile, _plan_implicit),
+    "slow shear": Kind(ShearFile, _plan_implicit),
+    "quasistatic shear": Kind(QuasistaticShearFile, _plan_quasistatic),
+    "ladder": Kind(LadderFile, _plan_ladder),
+    ENSEMBLE: Kind(EnsembleFile),
+    FOR_A_PACKING: Kind(RunFile),
+    MAKING: Kind(RunFile),
+}
+"""Kinds of runs by the attribute `kind` of their files, see `recording.driver.Plan`; packings have none."""

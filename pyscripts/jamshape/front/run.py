@@ -2,41 +2,50 @@
 
 from __future__ import annotations
 
-import json
 import math
 import warnings
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from jamshape.arguments import checked
 from jamshape.arrays import BoolArray, FloatArray, IntArray
-from jamshape.checks import RANGES, NotReachedWarning, require_number
+from jamshape.checks import RANGES, NotReachedWarning, Range, require_in, require_number
 from jamshape.files.content import add_attributes
 from jamshape.files.disk import named, settled
 from jamshape.files.h5md import (
     count_frames,
     read_attributes,
     read_observables,
-    read_origin,
     read_packing,
     read_report,
     read_style,
 )
 from jamshape.files.lock import Lock
 from jamshape.flow.cyclic_shear import QUARTERS
+from jamshape.flow.quasistatic import QuasistaticShear, sheared
+from jamshape.front.frames import recorded_frames
 from jamshape.front.packing import Packing
 from jamshape.front.progress import follow, place
+from jamshape.landscape import Landscape, State
+from jamshape.measures.contact_changes import (
+    At,
+    ContactChange,
+    Search,
+    contact_changes,
+    numbers_of_changes,
+)
 from jamshape.measures.events import Event, stress_drops
 from jamshape.measures.jamming import Jamming, Tried, minimised_frames
 from jamshape.measures.onset import OnsetFit, fit_onset
 from jamshape.measures.steady import SteadyState, steady_state
+from jamshape.packing import Packing as PackingLike
+from jamshape.protocols.ladder import Ladder, bring
 from jamshape.recording.driver import Told
 
 if TYPE_CHECKING:
@@ -45,6 +54,9 @@ if TYPE_CHECKING:
 
 # Forces below this mean bond force have nothing to balance.
 _NO_ENERGY = RANGES["u0"].low
+
+_WITHIN = Range(1e-12, 1.0, "a relative distance")
+_PART_OF_WITHIN = 0.1  # accuracy of states that enclose a change
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +109,16 @@ class Recorded:
         """(T,) packing fractions."""
         return self["phi"]
 
+    def _changes(self, search: Search, values: FloatArray, first: int = 0) -> list[ContactChange]:
+        """Compare all frames from the first one on, which have these values of the control parameter."""
+        if search.within is not None:
+            require_in("within", search.within, _WITHIN)
+        return contact_changes(self._states(values, first), search)
+
+    def _states(self, values: FloatArray, first: int = 0) -> Iterator[At]:
+        """Read the frames from the first one on, which have these values."""
+        return (At(value, self.packing(first + k)) for k, value in enumerate(values.tolist()))
+
     @property
     def pressure(self) -> FloatArray:
         """(T,) pressures, [energy / length^D]."""
@@ -115,7 +137,7 @@ class Recorded:
         return Packing.read(self.file, frame)
 
     def __iter__(self) -> Iterator[Packing]:
-        return map(self.packing, range(len(self)))
+        return iter(recorded_frames(self.file))
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the pressure; arguments as in `jamshape.plot`."""
@@ -365,13 +387,53 @@ class QuasistaticShearFile(Recorded):
 
     @property
     def strain(self) -> FloatArray:
-        """(T,) strains since the first minimum."""
+        """(T,) strains since the first minimum, of either sign."""
         return self["strain"]
+
+    @property
+    def cycles(self) -> int:
+        """Number of cycles; 0 without an amplitude."""
+        return int(self.about.get("cycles", 0))
+
+    @property
+    def steps_per_cycle(self) -> int:
+        """Number of steps, and so of rows, of each cycle; 0 without cycles."""
+        return QUARTERS * self._how.quarter if self.cycles else 0
+
+    @property
+    def _how(self) -> QuasistaticShear:
+        """Settings of the run."""
+        return QuasistaticShear.of(self.about)
 
     @property
     def stress(self) -> FloatArray:
         """(T,) dU/d(strain) over the volume, [energy / length^D]: the shear stress of simple shear."""
         return self["stress"]
+
+    @checked
+    def contact_changes(
+        self, *, within: float | None = None, step_back: bool = False
+    ) -> list[ContactChange]:
+        """List the contacts that opened and closed between frames, or more closely; see `LadderFile.contact_changes`.
+
+        The control parameter is the strain, and `within` relative to the larger strain of two frames. With `frames` of
+        at least the number of steps, a run keeps the state of each.
+
+        Parameters
+        ----------
+        within : float, optional
+            Largest distance between the two strains that enclose a change.
+        step_back : bool
+            Whether to find out if changes are reversible.
+        """
+        how = self._how
+
+        def bring(start: At, value: float) -> PackingLike:
+            at, landscape = start.packing, Landscape(start.packing)
+            return sheared(landscape, State.of(at), how, value - start.value).state.packing(at)
+
+        strains = np.array([self.packing(k).time for k in range(1, len(self))])
+        return self._changes(Search(bring, within, step_back=step_back), strains, first=1)
 
     @checked
     def events(self, least: float = 1e-2) -> list[Event]:
@@ -410,8 +472,11 @@ class QuasistaticShearFile(Recorded):
 
     @checked
     def steady(self, after: float | None = None) -> SteadyState:
-        """Average over the steady state, as in `ShearFile.steady`."""
-        return steady_state(self.observables, self.strain, after)
+        """Average over the steady state, as in `ShearFile.steady`, along the strain of either sign; not of cycles."""
+        if self.cycles:
+            msg = f"the shear has {self.cycles} cycles, expected one strain without a turn for a steady state"
+            raise ValueError(msg)
+        return steady_state(self.observables, np.abs(self.strain), after)
 
     def __repr__(self) -> str:
         end = f"strain = {self.strain[-1]:.5g}, phi = {self.phi[-1]:.5g}, stress = {self.stress[-1]:.3g}"
@@ -419,75 +484,129 @@ class QuasistaticShearFile(Recorded):
         return f"<Quasistatic shear of {self._who()}: {steps} steps to {end}{self._where()}>"
 
 
-class EnsembleFile(Recorded):
-    """An ensemble of packings in its H5MD file, a row for each seed; parameters as in `Recorded`.
+class LadderFile(Recorded):
+    """A packing taken through values of a control parameter, in its H5MD file; parameters as in `Recorded`.
 
-    ``table["phi_J"]`` looks up a column: phi, phi_J, pressure, u, z, z_single, n_rattlers, S2, residual, evaluations,
-    wall_seconds and others by the names of packings' results; NaN where a sample failed, or has none.
+    Row and frame 0 are of the start, and the others of one value each. Rows contain ``u``, ``phi``, ``pressure``, ``z``,
+    ``z_single``, ``rattlers``, ``contacts``, ``bonds`` and ``residual``.
 
     Examples
     --------
     >>> import jamshape as js
-    >>> table = js.ensemble(js.Spherocylinders(alpha=1), n=16, seeds=range(4), u0=1e-8, progress=False)
-    >>> table
-    <Ensemble of 16 spherocylinders in 2D: 4 samples, 4 of them at rest, phi_J = 0.8...>
-    >>> table["z"].shape, table.failures
-    ((4,), {})
+    >>> discs = js.Spherocylinders(alpha=0)
+    >>> packing = js.make_packing(discs, n=16, u0=1e-4, file="dense.h5", progress=False)
+    >>> run = js.ladder(packing, u0=[1e-5, 1e-6], file="ladder.h5", progress=False)
+    >>> run
+    <Ladder of 16 spherocylinders in 2D: 2 of 2 values to u0 = 1e-06, phi = 0.7..., z = ..., in ladder.h5>
+    >>> run.values.shape, len(run), bool((run.phi[1:] < run.phi[:-1]).all())
+    ((3,), 3, True)
+    >>> change = run.contact_changes()[0]
+    >>> change.change, change.after < change.before
+    ('opened', True)
     """
 
     @property
-    def seeds(self) -> IntArray:
-        """(S,) seeds of the rows."""
-        return self["seed"].astype(np.int64)
+    def parameter(self) -> str:
+        """Name of the control parameter, ``u0``."""
+        return str(self.about["ladder_parameter"])
+
+    @property
+    def values(self) -> FloatArray:
+        """(T,) values of the control parameter: that of the start, and those asked for."""
+        own = self[_OBSERVABLE_OF[self.parameter]]
+        return np.concatenate([own[:1], self["goal"][1:]])
+
+    def _numbers(self) -> IntArray:
+        """(T, 2) numbers of contacts that opened and closed."""
+        return np.array(numbers_of_changes(self._states(self.values)))
+
+    @property
+    def opened(self) -> IntArray:
+        """(T,) number of contacts that opened on the way to each state from the one before."""
+        return np.asarray(self._numbers()[:, 0])
+
+    @property
+    def closed(self) -> IntArray:
+        """(T,) number of contacts that closed on the way to each state from the one before."""
+        return np.asarray(self._numbers()[:, 1])
 
     @property
     def reached(self) -> BoolArray:
-        """(S,) whether forces balance to the tolerance."""
-        return self["reached"].astype(bool)
+        """(T,) whether the value was reached; if not, the state is that of the row before."""
+        return self["reached"] > 0
 
     @property
-    def outcome(self) -> NDArray[np.str_]:
-        """(S,) how each sample ended: ``converged``, ..., or ``failed`` without a packing."""
-        names = np.array(str(self.about["outcomes"]).split())
-        return np.asarray(names[self["outcome"].astype(int)])
-
-    @property
-    def failures(self) -> dict[int, str]:
-        """Why samples failed, or did not reach their goal, by their seeds."""
-        return {int(seed): why for seed, why in json.loads(self.about["failures"]).items()}
-
-    @property
-    def origin(self) -> str:
-        """Type of machine on which the last bits depend."""
-        return read_origin(self.file)
-
-    def to_pandas(self) -> Any:
-        """Return a `pandas.DataFrame`, a row for each seed; needs the package pandas."""
-        import pandas as pd  # type: ignore[import-untyped] # noqa: PLC0415 - may be missing
-
-        columns = {"seed": self.seeds, "outcome": self.outcome, "reached": self.reached}
-        return pd.DataFrame(
-            columns | {k: v for k, v in self.observables.items() if k not in columns}
-        )
+    def at_rest(self) -> BoolArray:
+        """(T,) whether forces balance to the tolerance."""
+        return np.asarray(self["residual"] <= self.about["tolerance"])
 
     def warn_unless_reached(self) -> None:
-        """Warn if samples failed, or did not reach their goal."""
-        if failures := self.failures:
-            seed, why = next(iter(failures.items()))
+        """Warn if a value was not reached, or forces do not balance there."""
+        wrong = ~(self.reached & self.at_rest)[1:]
+        if wrong.any():
+            values = ", ".join(f"{value:g}" for value in self.values[1:][wrong])
             said = (
-                f"{len(failures)} of {len(self)} samples failed or did not reach their goal, expected none: the"
-                f" first, seed {seed}: {why}; failures lists all"
+                f"at {values} no minimum with balanced forces was found, expected one at each of {wrong.size} values;"
+                f" give {{{self.parameter}:name}} more values between, or another start"
             )
-            warnings.warn(NotReachedWarning(said, {}), stacklevel=3)
+            warnings.warn(NotReachedWarning(said, {self.parameter: None}), stacklevel=3)
 
-    def __len__(self) -> int:
-        """Count the samples so far."""
-        return len(self.observables.get("seed", ()))
+    @checked
+    def contact_changes(
+        self, *, within: float | None = None, step_back: bool = False
+    ) -> list[ContactChange]:
+        """List the contacts that opened and closed from one state to the next.
+
+        Contacts of rattlers are included. Images of a pair are counted, not told apart.
+
+        Parameters
+        ----------
+        within : float, optional
+            Largest relative distance between the two values that enclose a change, such as 1e-6, reached by
+            bisection with minimisations; by default the values of the run enclose them.
+        step_back : bool
+            Whether to find out if changes are reversible: the packing is taken back over each interval, and ``returns``
+            says whether it has the same contacts again and no particle moved by more than 1e-3 radii.
+
+        Returns
+        -------
+        list of ContactChange
+            ``before`` and ``after`` (values of the control parameter), ``ids`` of the particles, ``bond`` (2 for the
+            second bond of a side-to-side contact), ``change`` ("opened" or "closed") and ``returns``.
+
+        Raises
+        ------
+        TargetError
+            If no minimum is found between two states.
+
+        Examples
+        --------
+        >>> import jamshape as js
+        >>> discs = js.Spherocylinders(alpha=0)
+        >>> packing = js.make_packing(discs, n=16, u0=1e-4, file="dense.h5", progress=False)
+        >>> run = js.ladder(packing, u0=[1e-5], progress=False)
+        >>> changes = run.contact_changes(within=1e-3)
+        >>> all(0 < change.before / change.after - 1 <= 1e-3 for change in changes)
+        True
+        """
+        how = Ladder.of(self.about)
+        if within is not None:
+            how = replace(how, accuracy=min(how.accuracy, _PART_OF_WITHIN * within))
+
+        def to(start: At, value: float) -> PackingLike:
+            at, landscape = start.packing, Landscape(start.packing)
+            return bring(landscape, State.of(at), how.to(value)).state.packing(at)
+
+        return self._changes(Search(to, within, True, step_back), self.values)
 
     def __repr__(self) -> str:
-        jammed = self["phi_J"][self.reached]
-        mean = f", phi_J = {jammed.mean():.5g} +- {jammed.std():.2g}" if len(jammed) else ""
-        return f"<Ensemble of {self._who()}: {len(self)} samples, {self.reached.sum()} of them at rest{mean}{self._where()}>"
+        done, asked = int(self.about["ladder_done"]), np.size(self.about["ladder_values"])
+        end = f"{self.parameter} = {self.values[-1]:.3g}, phi = {self.phi[-1]:.6g}, z = {self['z'][-1]:.4g}"
+        return f"<Ladder of {self._who()}: {done} of {asked} values to {end}{self._where()}>"
+
+
+_OBSERVABLE_OF = {"u0": "u"}
+"""Observable of a control parameter."""
 
 
 def _brought_along(kind: type[Recorded], name: str, content: bytes) -> Recorded:
@@ -495,19 +614,3 @@ def _brought_along(kind: type[Recorded], name: str, content: bytes) -> Recorded:
     at = place(None, name)
     at.path.write_bytes(content)
     return kind(*at)
-
-
-def run_file(path: Path, folder: Any = None) -> Recorded:
-    """Open a run's file as the class of its kind."""
-    known = read_attributes(path)
-    kind = next((kind for mark, kind in _KINDS.items() if mark in known), RunFile)
-    return kind(path, folder)
-
-
-_KINDS: dict[str, type[Recorded]] = {
-    "gdot": ShearFile,
-    "amplitude": CyclicShearFile,
-    "shear_steps": QuasistaticShearFile,
-    "ensemble_seeds": EnsembleFile,
-}
-"""Classes by an attribute that only their files have."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from jamshape.arguments import checked
@@ -12,6 +13,7 @@ from jamshape.checks import (
     require_given,
     require_no_effect,
     require_stated,
+    require_with,
 )
 from jamshape.flow import cyclic_driver, implicit_driver, lammps_driver, quasistatic_driver
 from jamshape.flow.cyclic_shear import QUARTERS, CyclicShear, dividing, longest_step
@@ -21,6 +23,7 @@ from jamshape.flow.quasistatic import QuasistaticShear
 from jamshape.flow.shear import Shear
 from jamshape.flow.slow_shear import SlowShear
 from jamshape.front.progress import place
+from jamshape.front.reading import Held
 from jamshape.front.recorded import recorded
 from jamshape.front.run import CyclicShearFile, QuasistaticShearFile, ShearFile
 from jamshape.front.starts import Asked, Start
@@ -53,7 +56,7 @@ def shear(
     strain: float = 5.0,
     flow: str = "simple",
     seed: int | None = None,
-    start: Packing | str | Path | None = None,
+    start: Held | None = None,
     sides: int = 2,
     integrator: str | None = None,
     dt: float | None = None,
@@ -86,7 +89,7 @@ def shear(
     seed : int, optional
         Random seed of the start; 1 by default.
     start : Packing or path, optional
-        Initial packing, or H5MD file whose last frame to start from, at its own packing fraction.
+        Initial packing, or a file that `load` reads, whose last frame to start from, at its own packing fraction.
     sides : int
         Bonds of a side-to-side contact of rods, 1 or 2.
     integrator : str, optional
@@ -171,7 +174,7 @@ def cyclic_shear(
     cycles: int = 20,
     flow: str = "simple",
     seed: int | None = None,
-    start: Packing | str | Path | None = None,
+    start: Held | None = None,
     sides: int = 2,
     integrator: str | None = None,
     dt: float | None = None,
@@ -283,12 +286,14 @@ def quasistatic_shear(
     dimension: int | None = None,
     phi: float | None = None,
     step: float = 1e-3,
-    strain: float = 0.5,
+    strain: float | None = None,
+    amplitude: float | None = None,
+    cycles: int | None = None,
     flow: str = "simple",
     pressure: float = 0.0,
     tolerance: float = 1e-8,
     seed: int | None = None,
-    start: Packing | str | Path | None = None,
+    start: Held | None = None,
     frames: int = 20,
     file: str | Path | None = None,
     again: bool = False,
@@ -308,9 +313,14 @@ def quasistatic_shear(
     phi : float, optional
         Packing fraction, reached by quasistatic compression of a random packing; 0.9 by default, or that of the start.
     step : float
-        Strain of each step.
-    strain : float
-        Final strain.
+        Strain of each step, without its sign.
+    strain : float, optional
+        Final strain, negative to shear the other way; 0.5 by default.
+    amplitude : float, optional
+        Largest strain of cyclic shear, instead of `strain`: a triangle wave, from 0 to the amplitude, to minus the
+        amplitude, and back to 0, in equal steps of at most `step`.
+    cycles : int, optional
+        Number of cycles; 1 by default with `amplitude`.
     flow : {"simple", "pure"}
         Simple or pure shear.
     pressure : float, [energy / length^D]
@@ -320,9 +330,10 @@ def quasistatic_shear(
     seed : int, optional
         Random seed of the start; 1 by default.
     start : Packing or path, optional
-        Initial packing, or H5MD file whose last frame to start from, at its own packing fraction.
+        Initial packing, or a file that `load` reads, whose last frame to start from, at its own packing fraction and in its own
+        box, also a tilted one, where the strain is 0.
     frames : int
-        Approximate number of snapshots to keep.
+        Approximate number of snapshots to keep; those at the strains 0 and +-amplitude of cycles are added.
     file, again, seconds, progress
         See `compress`.
 
@@ -352,11 +363,15 @@ def quasistatic_shear(
     >>> run.strain.shape, bool((run.phi == run.phi[0]).all())
     ((51,), True)
     """
-    require_stated(frames=frames, strain_step=step, strain_end=strain)
-    require_stated(tolerance=tolerance, hold_pressure=pressure)
+    require_no_effect("amplitude", amplitude, strain=strain)
+    require_with("amplitude", amplitude, cycles=cycles)
+    require_stated(frames=frames, strain_step=step, tolerance=tolerance, hold_pressure=pressure)
+    require_given(strain_end=None if strain is None else abs(strain), amplitude=amplitude, cycles=cycles)  # fmt: skip
     asked = Asked(n, phi, seed, dimension)
     of = Start.of(particles, asked, start, usual_phi=0.9, phi_name=_PHI_NAME)
-    how = QuasistaticShear(step, strain, flow, pressure, tolerance)
+    how = QuasistaticShear(step, 0.5 if strain is None else strain, flow, pressure, tolerance)
+    if amplitude is not None:
+        how = replace(how, amplitude=amplitude, cycles=1 if cycles is None else cycles)
     at = place(file, "aqs.h5")
     plan = quasistatic_driver.plan(lambda: _still(of), how, frames, of.made_from)
     recorded(at.path, plan, again=again, seconds=seconds, progress=progress)

@@ -5,28 +5,26 @@ from __future__ import annotations
 import hashlib
 import os
 import warnings
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from jamshape.checks import require_no_effect, require_one_of, require_stated
 from jamshape.files.disk import named
-from jamshape.front.packing import Packing, public
+from jamshape.front.packing import Packing
+from jamshape.front.reading import Held, packing_of
 from jamshape.packing import Packing as PackingLike
 from jamshape.protocols.random_start import random_packing, start_below
 from jamshape.shapes.particles import Particles
 from jamshape.shapes.shape import Interaction, Stiffness, stiffness_text
 
 
-def start_of(start: PackingLike | str | Path, sides: int = 2) -> Packing:
-    """Return the initial packing, or the last frame of a file, under the law of the run.
+def start_of(start: Held, sides: int = 2) -> Packing:
+    """Return the initial packing, as `packing_of`, under the law of the run.
 
     Warns if the default number of side-to-side bonds differs from that of the start.
     """
-    if isinstance(start, str | Path):
-        start = Packing.read(Path(start))
-    known = public(start)
+    known = packing_of(start)
     if known.law.sides == sides:
         return known
     # `sides` was given explicitly.
@@ -85,7 +83,7 @@ class Start(NamedTuple):
         cls,
         particles: Particles | None,
         asked: Asked,
-        start: PackingLike | str | Path | None,
+        start: Held | None,
         *,
         usual_phi: float,
         sides: int = 2,

@@ -9,7 +9,7 @@ import subprocess
 import tempfile
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, Self
+from typing import TYPE_CHECKING, Any, BinaryIO, NoReturn, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,6 +93,18 @@ class Session:
     -----
     An error in a command raises `LammpsError`, even where LAMMPS itself would end the process. Without `screen`, warnings
     still reach standard error, through a filter that outlives the process. Threads take turns, command by command.
+
+    Examples
+    --------
+    >>> import jamshape as js
+    >>> from jamshape.protocols.random_start import random_packing
+    >>> with js.Session() as session:
+    ...     session.load(random_packing(n=8, phi=0.3, seed=1))
+    ...     session.interact(js.Interaction(k_e=2.0, sides=2))
+    ...     session.commands("fix squeeze all overdamped/affine drag 1.0 compress 1e-3")
+    ...     session.commands("run 10")
+    ...     js.load(session).phi > 0.3
+    True
     """
 
     def __init__(
@@ -127,6 +139,10 @@ class Session:
 
     def __enter__(self) -> Self:
         return self
+
+    def __reduce__(self) -> NoReturn:
+        msg = "a Session holds a running LAMMPS, which cannot be pickled or copied; take its packing, session.packing()"
+        raise TypeError(msg)
 
     def __exit__(self, *_: object) -> None:
         self.close()

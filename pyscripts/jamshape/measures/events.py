@@ -18,7 +18,7 @@ class Event(NamedTuple):
     stress: float
     """Stress before it, [energy / length^D]."""
     drop: float
-    """Decrease of the stress, [energy / length^D]."""
+    """Decrease of the stress, or increase as the strain falls, [energy / length^D]."""
     lost: float
     """Dissipated energy over the volume, [energy / length^D]."""
     steps: int
@@ -28,7 +28,7 @@ def stress_drops(observables: Mapping[str, FloatArray], least: float = 1e-2) -> 
     """List the drops of the stress from one minimum to the next.
 
     A sheared packing resists increasingly until its minimum vanishes, or slides; consecutive steps in which the
-    stress falls are one event.
+    stress falls are one event. Where the strain falls, the stress that resists is negative, and drops are increases.
 
     Parameters
     ----------
@@ -50,14 +50,15 @@ def stress_drops(observables: Mapping[str, FloatArray], least: float = 1e-2) -> 
     Event(strain=2.0, stress=2.0, drop=1.5, lost=0.0, steps=2)
     """
     strain, stress, lost = (np.asarray(observables[name]) for name in ("strain", "stress", "lost"))
-    falls = np.concatenate([[False], np.diff(stress) < 0, [False]])
-    begins, ends = (
-        np.flatnonzero(np.diff(falls.astype(int)) == 1),
-        np.flatnonzero(np.diff(falls.astype(int)) == -1),
-    )
+    # Of the strain in each step; 0 where the stress along it does not fall.
+    sign = np.sign(np.diff(strain)).astype(int)
+    falls = np.concatenate([[0], np.where(sign * np.diff(stress) < 0, sign, 0), [0]])
+    turns = np.diff(falls) != 0
+    begins = np.flatnonzero(turns & (falls[1:] != 0))
+    ends = np.flatnonzero(turns & (falls[:-1] != 0))
     found = [
         Event(
-            float(strain[a]), float(stress[a]), float(stress[a] - stress[b]),
+            float(strain[a]), float(stress[a]), float(abs(stress[a] - stress[b])),
             float(lost[a + 1 : b + 1].sum()), int(b - a),
         )
         for a, b in zip(begins, ends, strict=True)

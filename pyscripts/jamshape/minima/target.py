@@ -103,7 +103,7 @@ class Target:
         return replace(self, tolerance=tolerance, accuracy=accuracy)
 
     def find(self, landscape: Landscape, start: State) -> Minimum:
-        """Lead a state to the energy, and minimise it; errors as `extrapolation`."""
+        """Find the minimum of the energy u0 that begins at a state; errors as `extrapolation`."""
         return find(landscape, start, self)
 
     def strain_above_jamming(self, landscape: Landscape) -> float:
@@ -123,7 +123,7 @@ class FixedBox:
         require_one_of("minimiser", self.method, METHODS)
 
     def is_met(self, u: float) -> bool:
-        """Every energy will do."""
+        """Accept every energy."""
         del u
         return True
 

@@ -14,6 +14,7 @@ import numpy as np
 from jamshape.arguments import checked_fields
 from jamshape.arrays import BoolArray, FloatArray, IntArray, LongArray, real_numbers
 from jamshape.packing.box import Box, Lengths, number_of_tilts
+from jamshape.packing.columns import as_columns, kept
 from jamshape.packing.given import as_floats, as_integers
 from jamshape.packing.rotation import UNIT_QUATERNION_TOLERANCE, across, body_axes
 from jamshape.records import Record
@@ -62,6 +63,7 @@ class Packing(Record):
     tilt_rest: FloatArray = field(default_factory=lambda: np.empty(0))
     results: Mapping[str, Any] = field(default_factory=dict)
     file: Path | None = None
+    columns: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         n = len(np.atleast_1d(real_numbers("position", self.position)))
@@ -89,6 +91,7 @@ class Packing(Record):
         _check_labels(self)
         _check_shapes(self)
         object.__setattr__(self, "law", _checked_law(self.law, self.species))
+        object.__setattr__(self, "columns", as_columns(self.columns, n))
         if self.file is not None:  # so that it stays valid when the working folder changes
             object.__setattr__(self, "file", self.file.absolute())
 
@@ -261,10 +264,15 @@ class Packing(Record):
         order = np.argsort(self.id)
         names = ["position", "orientation", "diameters", "exponent", "species", "id", "image"]
         names += ["position_rest", "orientation_rest"]
-        return self.with_(**{name: getattr(self, name)[order] for name in names})
+        columns = {name: column[order] for name, column in self.columns.items()}
+        return self.with_(**{name: getattr(self, name)[order] for name in names}, columns=columns)
 
     def with_(self, **changes: Any) -> Self:
-        """Return a packing with the named fields replaced, and without results and file; new poses are exact doubles."""
+        """Return a packing with the named fields replaced, and without results and file; new poses are exact doubles.
+
+        Other columns are kept, but with new poses, sizes or box only labels such as ``mol``.
+        """
+        changes.setdefault("columns", kept(self.columns, changes))
         for name, rests in _REST_OF.items():
             for rest in rests if name in changes else ():
                 changes.setdefault(rest, np.empty(0))
@@ -273,7 +281,7 @@ class Packing(Record):
     @property
     def to_store(self) -> dict[str, Any]:
         """Return the results without attributes of a run: a single frame cannot be continued as a run."""
-        return {k: v for k, v in self.results.items() if k != "finished"}
+        return {k: v for k, v in self.results.items() if k not in {"kind", "finished"}}
 
 
 def _check_labels(packing: Packing) -> None:

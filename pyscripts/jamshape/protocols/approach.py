@@ -21,6 +21,9 @@ from jamshape.packing import Packing
 from jamshape.recording.driver import Plan, Row, Told
 from jamshape.shapes.shape import Interaction
 
+FOR_A_PACKING = "compression for a packing"
+"""Kind of the files of compressions in LAMMPS with which packings begin."""
+
 ROWS_PER_MARK = 50
 """Rows between two marks."""
 
@@ -116,7 +119,7 @@ def plan(start: Callable[[], Packing], settings: Approach, made_from: Mapping[st
     def restore(first: Packing, checkpoint: Checkpoint) -> ApproachDriver:
         return ApproachDriver(first, settings, checkpoint)
 
-    return Plan("the compression of a packing", made_from, begin, restore)
+    return Plan(FOR_A_PACKING, "the compression of a packing", made_from, begin, restore)
 
 
 class ApproachDriver:

@@ -22,6 +22,9 @@ from jamshape.protocols.recipe import Recipe
 from jamshape.recording.driver import Plan, Row, Told
 from jamshape.recording.workers import Workers
 
+ENSEMBLE = "ensemble"
+"""Kind of the files of ensembles."""
+
 FAILED = "failed"
 """Outcome of a sample without a packing."""
 
@@ -93,6 +96,7 @@ def plan(recipe: Recipe, seeds: Sequence[int], jobs: int, folder: Path | None) -
 
     seeds_as_array = np.array(list(seeds), np.int64)
     return Plan(
+        ENSEMBLE,
         "an ensemble",
         own | {"ensemble_seeds": seeds_as_array},
         begin,

@@ -8,6 +8,7 @@ file until the packing is finished, ``OUT.making.h5``, from which an interrupted
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -74,6 +75,9 @@ __all__ = [
 ]
 
 # Rows and frames of marschall-2018; frames are about 2e-3 of phi apart at jamming.
+MAKING = "packing in the making"
+"""Kind of the file beside a packing until it is finished."""
+
 _SIZES = Sizes(600, 300)
 
 # Settings of the search alone; a compression, whose file holds its final packing fraction, serves any search.
@@ -144,7 +148,7 @@ def _plan(
         del first
         return Pipeline(recipe, source, checkpoint, retry=retry)
 
-    return Plan("a packing", recipe.attributes(), begin, restore, finish=finish)
+    return Plan(MAKING, "a packing", recipe.attributes(), begin, restore, finish=finish)
 
 
 def _making_file(out: Path) -> Path:
@@ -215,7 +219,8 @@ def _compression(recipe: Recipe) -> Plan:
     flow = Compression(kappa=way.kappa, phi_end=way.phi_end, sides=2, integrator="rkc2")
     flow = flow.in_steps(recipe.phi_start, _SIZES.rows, recipe.dimension)
     of_run = {name: value for name, value in told.items() if name not in _OF_SEARCH}
-    return lammps_driver.plan(start, flow, _SIZES, of_run | {"of_packing": True})
+    plan = lammps_driver.plan(start, flow, _SIZES, of_run)
+    return dataclasses.replace(plan, kind=approach.FOR_A_PACKING)
 
 
 class Pipeline:

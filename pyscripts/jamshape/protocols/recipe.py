@@ -13,7 +13,7 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.checks import ArgumentError, require_one_of, require_rising, require_stated
 from jamshape.files.h5md import read_packing
-from jamshape.files.vocabulary import ATHERMAL, COMPRESSED, THERMAL
+from jamshape.files.vocabulary import ATHERMAL, COMPRESSED, MINIMISED, THERMAL
 from jamshape.minima.target import FixedBox, Goal, Target, bisection, extrapolation
 from jamshape.packing import Packing
 from jamshape.protocols.approach import Approach
@@ -263,7 +263,7 @@ class Given:
     def attributes(self, target: Target | None) -> dict[str, Any]:
         """Return its identifying attributes."""
         del target
-        told = {"protocol": "minimise", "evaluations_limit": self.evaluations}
+        told = {"protocol": MINIMISED, "evaluations_limit": self.evaluations}
         return dict(self.made_from) | vars(self.goal) | told
 
     def require(self, recipe: Recipe) -> None:

@@ -16,6 +16,9 @@ from numpy.typing import ArrayLike
 from jamshape.files.checkpoint import Checkpoint
 from jamshape.packing import Packing
 
+KIND = "kind"
+"""Attribute of the files of drivers."""
+
 
 class Told(NamedTuple):
     """Progress of a run."""
@@ -81,6 +84,8 @@ class Plan:
 
     Parameters
     ----------
+    kind
+        Kind of its file, such as ``compression``: the attribute of that name, which `front.recorded` opens and resumes it by.
     what
         Name in messages, with its article, such as ``a compression``.
     settings
@@ -96,6 +101,7 @@ class Plan:
         Writes the results elsewhere at the end, when the file is not needed any more.
     """
 
+    kind: str
     what: str
     settings: Mapping[str, Any]
     begin: Callable[[], Driver]

@@ -23,7 +23,7 @@ from jamshape.files.content import Content
 from jamshape.files.disk import remove_leftovers
 from jamshape.files.hdf5 import FileFormatError
 from jamshape.files.lock import Lock
-from jamshape.recording.driver import Driver, Plan, Row
+from jamshape.recording.driver import KIND, Driver, Plan, Row
 from jamshape.recording.interrupts import Interrupts
 
 PAUSE = 100.0
@@ -139,7 +139,7 @@ def _follow(run: _Run, interrupts: Interrupts, how: How, end: float) -> None:
 
 
 def stopped(where: str, how: How, path: Path | None = None) -> str:
-    """Say that the time was up, and how to go on, which needs a file."""
+    """Return the message that the time was up; only with a file the run can go on."""
     said = f"stopped after {how.seconds:.3g} s {where}, expected the end"
     if path is None:
         return f"{said}; with a file the same call goes on from there"
@@ -159,7 +159,7 @@ def _opened(path: Path, plan: Plan, how: How) -> _Run | None:
 def _begun(path: Path, plan: Plan) -> _Run:
     """Begin a run; its file keeps the start, and shows at once whether it can be written."""
     driver = plan.begin()
-    content = Content(path, [driver.frame()], dict(plan.settings))
+    content = Content(path, [driver.frame()], {KIND: plan.kind, **plan.settings})
     run = _Run(content, driver, plan.finish)
     run.add(driver.first()._replace(error=None, has_frame=False))
     if plan.finish is None:
@@ -194,7 +194,7 @@ def require_same(content: Content, plan: Plan) -> None:
     advice = "choose another {file:name}, or use {again} to replace it"
     given = {"file": content.path, "again": True}
     stored, path = content.attributes, str(content.path).replace("{", "{{").replace("}", "}}")
-    if "finished" not in stored:
+    if stored.get(KIND) != plan.kind or "finished" not in stored:
         said = f"{path} does not hold {plan.what}, expected one; {advice}"
         raise ArgumentError(said, given)
     for name, value in plan.settings.items():

@@ -81,7 +81,9 @@ def test_a_packing_of_which_nothing_is_known_is_measured(jamshape, tiny, tmp_pat
         assert report["S_2"] == pytest.approx(stored["S2"], rel=1e-12)
 
 
-@pytest.mark.parametrize(("name", "kind"), [("run.h5", "run"), ("slow.h5", "slow run")])
+@pytest.mark.parametrize(
+    ("name", "kind"), [("run.h5", "compression"), ("slow.h5", "slow compression")]
+)
 def test_a_run(jamshape, tiny, name, kind):
     lines, report = info(jamshape, tiny[0] / name)
     said = tiny[1][name].report
@@ -105,7 +107,7 @@ def test_a_run(jamshape, tiny, name, kind):
         ),
         (
             "packing.h5.making.h5",
-            {"stage": "searching"},
+            {"kind": "packing in the making", "finished": False},
             "the command for {folder}/packing.h5, which continues",
         ),
     ],
@@ -161,6 +163,10 @@ def test_dumps_and_restart_files_of_lammps(jamshape, tiny, tmp_path):
     _, report = info(jamshape, dump, "--shape", "spherocylinder", "--dimension", "2")
     assert (report["kind"], report["frames"], report["n"]) == ("LAMMPS dump", 3, 16)
     assert report["phi"] == pytest.approx(packing.phi, rel=1e-12)
+    packed = tmp_path / "packed.gz"
+    packed.write_bytes(gzip.compress(dump.read_bytes()))
+    _, again = info(jamshape, packed, "--shape", "spherocylinder", "--dimension", "2")
+    assert again == report | {"file": str(packed)}
     lines, report = info(jamshape, restart)
     assert (report["kind"], report["step"], report["dimension"]) == ("LAMMPS restart file", 7, 2)
     assert report["lammps"][-4:].isdigit()

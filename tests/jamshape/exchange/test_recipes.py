@@ -14,7 +14,13 @@ PAGE = Path(__file__).parents[3] / "docs/how-to/other-tools.md"
 TEXT = PAGE.read_text(encoding="utf-8")
 
 # A section is named by its tool; what must be importable for it.
-NEEDS = {"GSD": "gsd", "freud": "freud", "OVITO": "ovito", "MDAnalysis": "MDAnalysis"}
+NEEDS = {
+    "GSD": "gsd",
+    "freud": "freud",
+    "OVITO": "ovito",
+    "MDAnalysis": "MDAnalysis",
+    "Arrays": "numpy",
+}
 
 RECIPES = [
     pytest.param(tool, code, id=f"{tool}-{k}")
@@ -30,7 +36,7 @@ def folder(request, tmp_path, monkeypatch):
     first = pressed(dimension=request.param)
     assert len(find_contacts(first).pairs)
     write_packing(tmp_path / "packing.h5", first)
-    told = {"finished": True, "kappa": 1e-6}
+    told = {"kind": "compression", "finished": True, "kappa": 1e-6}
     later = [scaled(first, 1 - 0.01 * k).with_(step=k, time=float(k)) for k in (1, 2)]
     row = (first.step, first.time, {"phi": first.phi, "pressure": 0.1})
     write_content(tmp_path / "run.h5", [first, *later], told, [row])
@@ -39,7 +45,7 @@ def folder(request, tmp_path, monkeypatch):
 
 
 def test_every_recipe_is_tried():
-    assert len(RECIPES) == TEXT.count("```python") == 6
+    assert len(RECIPES) == TEXT.count("```python") == 7
     assert {param.values[0] for param in RECIPES} == set(NEEDS)
 
 
@@ -54,4 +60,4 @@ def test_recipe_runs(folder, tool, code):
             raise
         pytest.skip("this OVITO draws nothing without libvulkan1 and mesa-vulkan-drivers")
     made = {path.name for path in folder.iterdir()} - {"packing.h5", "run.h5"}
-    assert made == set(re.findall(r'"((?:packing|run)\.(?:gsd|png|h5md))"', code))
+    assert made == set(re.findall(r'"((?:packing|run)\.(?:gsd|png|h5md)|mine\.h5)"', code))

@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
+from dumps import iter_dump, read_dump
 from lammps_runs import run_lmp_well
 from nasty import NASTY, assert_identical, nasty_packing, tilted_box
 
 from jamshape.files.h5md import FileFormatError, write_run
-from jamshape.files.lammps_text import iter_dump, read_any, read_data, read_dump, write_data
+from jamshape.files.lammps_text import read_any, read_data, write_data
 from jamshape.packing import Box
 
 RODS = "spherocylinder"
@@ -258,7 +259,7 @@ def test_dump_cut_anywhere_gives_the_complete_frames_before(path):
             "box bounds 'xy xz yz pp pp pp' have rows of 2 numbers, expected 3",
         ),
         ("pp pp pp", "abc origin pp pp pp", "box bounds are 'abc origin pp pp pp', expected 'pp"),
-        ("pp pp pp", "pp ff pp", "box bounds are 'pp ff pp', expected 'pp pp pp'"),
+        ("pp pp pp", "pp fx pp", "box bounds are 'pp fx pp', expected 'pp pp pp'"),
         ("ITEM: TIMESTEP\n7\n", "", r"items \['TIMESTEP'\] are missing before the atoms"),
         (
             "ITEM: BOX",
@@ -308,14 +309,17 @@ def test_read_any_takes_frames_from_either_end(path):
         0,
     ]
     for frame in (3, -4):
-        with pytest.raises(ValueError, match=f"has no frame {frame}, expected one from the file"):
+        with pytest.raises(ValueError, match=f"has 3 frames, expected frame {frame} to be one"):
             read_any(path, frame, shape=RODS)
 
 
 def test_read_any_reads_a_dump_no_further_than_asked(path):
     path.write_text(dump_frame(nasty_packing(2, step=0)) + "ITEM: TIMES")
     assert read_any(path, 0, shape=RODS).step == 0
-    with pytest.raises(FileFormatError, match="frame 1"):
+    with pytest.warns(UserWarning, match="ends within frame 1, which is left out"):
+        assert read_any(path, shape=RODS).step == 0
+    path.write_text(dump_frame(nasty_packing(2))[:-9])
+    with pytest.raises(FileFormatError, match="frame 0: the file ends within the frame"):
         read_any(path, shape=RODS)
 
 

@@ -5,12 +5,13 @@ import re
 
 import numpy as np
 import pytest
+from dumps import read_dump
 from lammps_runs import run_lmp_well
 
 import jamshape as js
 from jamshape.contacts import find_contacts
 from jamshape.files.h5md import FileFormatError
-from jamshape.files.lammps_text import read_data, read_dump, write_data
+from jamshape.files.lammps_text import read_data, write_data
 from jamshape.packing import Box, Packing
 from jamshape.shapes.shape import Interaction
 from jamshape.shapes.table import SHAPES
@@ -145,8 +146,8 @@ REFUSED = {
         "titled 'Atoms # hybrid molecular ellipsoid', which does not define its 8 columns",
     ),
     "another style": (
-        [("# ellipsoid", "# sphere")],
-        "titled 'Atoms # sphere', expected atoms of style ellipsoid",
+        [("# ellipsoid", "# atomic")],
+        "titled 'Atoms # atomic', expected atoms of style ellipsoid or sphere",
     ),
     "columns of a hybrid without a title": (
         [("Atoms # ellipsoid", "Atoms"), (ATOMS, "1 1 10 10 0 1 1.0\n2 1 10.5 10.8 0 1 1.0")],
@@ -174,12 +175,32 @@ def test_a_data_file_that_is_refused(path, changes, sentence):
 
 
 def test_files_of_other_formats_are_named(path):
-    path.write_bytes(gzip.compress(PLAIN.encode()))
+    path.write_bytes(gzip.compress(b"notes"))
     with pytest.raises(FileFormatError, match="state is compressed, expected the file itself"):
         js.load(path)
     path.write_bytes(b"LammpS RestartT\0" + bytes(50))
     with pytest.raises(FileFormatError, match="state is a restart file of LAMMPS, expected"):
         js.load(path)
+
+
+def test_a_data_file_of_discs(path):
+    rows = "1 1 1.5 1.0 10.0 10.0 0.0\n2 1 1.0 1.0 10.5 10.8 0.0"
+    path.write_text(changed(("# ellipsoid", "# sphere"), (ATOMS, rows), (ELLIPSOIDS, "")))
+    packing = js.load(path, shape=RODS)
+    np.testing.assert_array_equal(packing.diameters, [[1.5] * 3, [1.0] * 3])
+    assert packing.dimension == 2
+    path.write_text(path.read_text().replace("1 1 1.5", "1 1 0.0"))
+    with pytest.raises(FileFormatError, match="diameter holds 0, expected particles of positive"):
+        js.load(path, shape=RODS)
+
+
+def test_molecules_and_charges_of_a_hybrid_are_kept(path):
+    rows = "2 1 10.5 10.8 0.0 1 1.0 7 0.25\n1 1 10.0 10.0 0.0 1 1.0 8 0.5"
+    path.write_text(changed(("# ellipsoid", "# hybrid ellipsoid full"), (ATOMS, rows)))
+    columns = js.load(path, shape=RODS).columns
+    assert {name: column.tolist() for name, column in columns.items()} == {
+        "mol": [8, 7], "q": [0.5, 0.25],
+    }  # fmt: skip
 
 
 def test_blocks_of_lammps_from_2026_on_tell_the_exponent(path):

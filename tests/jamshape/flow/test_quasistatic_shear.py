@@ -144,3 +144,101 @@ def test_wrong_numbers_are_refused():
     ):
         with pytest.raises(ValueError, match=words):
             QuasistaticShear(**numbers)
+
+
+# --- either direction, and cycles -----------------------------------------------------------------
+
+
+def aqs_of(tmp_path, name="discs", **settings):
+    landscape, found = jammed(name, U0)
+    start = found.state.packing(landscape.particles)
+    given = {"start": start, "file": tmp_path / "run.h5", "progress": False} | settings
+    return js.quasistatic_shear(**given)
+
+
+def test_a_negative_strain_is_the_mirror_image():
+    landscape, found = jammed("discs", U0)
+    flip = np.array([-1, 1], np.longdouble)
+    mirrored = replace(found.state, position=found.state.position * flip)
+    how = {"strain_step": 1e-3, "tolerance": 1e-10}
+    one = list(shear(landscape, Sheared(found.state), QuasistaticShear(strain_end=-0.01, **how)))
+    other = list(shear(landscape, Sheared(mirrored), QuasistaticShear(strain_end=0.01, **how)))
+    assert [row.strain for row in one] == [-row.strain for row in other]
+    np.testing.assert_allclose([r.u for r in one], [r.u for r in other], rtol=1e-6)
+    scale = max(abs(row.stress) for row in other)
+    np.testing.assert_allclose(
+        [r.stress for r in one], [-r.stress for r in other], atol=1e-6 * scale
+    )
+    lost = [row.lost for row in one]
+    np.testing.assert_allclose(lost, [r.lost for r in other], atol=1e-6 * max(map(abs, lost)))
+
+
+def test_drops_in_the_other_direction_are_listed(tmp_path):
+    run = aqs_of(tmp_path, step=2e-3, strain=-0.06)
+    assert run.strain[-1] == pytest.approx(-0.06)
+    risen = np.maximum(np.diff(run.stress), 0).sum()
+    assert sum(event.drop for event in run.events(least=0.0)) == pytest.approx(risen, rel=1e-12)
+    assert run.steady(after=0.01).strain == pytest.approx(0.06)
+    assert run.plot().get_xlim() == pytest.approx((-0.06, 0))
+
+
+def test_cycles_are_a_triangle_wave_that_ends_in_the_box_of_the_start(tmp_path):
+    run = aqs_of(tmp_path, step=3e-3, amplitude=0.01, cycles=2)
+    quarter = np.array([0, 0.0025, 0.005, 0.0075, 0.01])
+    cycle = np.concatenate([quarter, quarter[-2::-1], -quarter[1:], -quarter[-2::-1]])
+    np.testing.assert_allclose(run.strain, np.concatenate([cycle, cycle[1:]]), atol=1e-18)
+    assert run.steps_per_cycle == 16
+    at = [frame.time for frame in run]
+    assert min(at) == -0.01
+    assert max(at) == 0.01
+    first, last = run.packing(0).box, run.packing(-1).box
+    np.testing.assert_allclose(last.matrix, first.matrix, atol=1e-15 * first.edges.max())
+    assert run.at_rest.all()
+    assert {"cycle 1", "cycle 2"} <= {line.get_label() for line in run.plot().lines}
+    with pytest.raises(ValueError, match="the shear has 2 cycles, expected one strain"):
+        run.steady()
+
+
+def test_a_reversible_cycle_loses_no_energy(tmp_path):
+    run = aqs_of(tmp_path, step=1e-6, amplitude=1e-5, tolerance=1e-11)
+    ends = run.stress[:: run.steps_per_cycle]
+    stored = np.abs(run["u"] - run["u"][0]).max()
+    assert ends[1] == pytest.approx(ends[0], abs=1e-4 * np.abs(run.stress - ends[0]).max())
+    assert abs(run["lost"].sum()) < 1e-4 * stored
+
+
+def test_cycles_far_beyond_half_an_edge_return_to_the_box(tmp_path):
+    run = aqs_of(tmp_path, step=0.1, amplitude=0.8)
+    first, last = run.packing(0).box, run.packing(-1).box
+    np.testing.assert_allclose(last.matrix, first.matrix, atol=1e-14 * first.edges.max())
+
+
+def test_a_frame_in_a_tilted_box_is_a_new_zero(tmp_path):
+    whole = aqs_of(tmp_path, step=1e-4, strain=0.02, frames=2, tolerance=1e-11)
+    half = whole.packing(2)
+    assert 0 < half.time < 0.02
+    assert half.box.is_tilted
+    rest = 0.02 - half.time
+    run = js.quasistatic_shear(
+        start=half, step=1e-4, strain=rest, tolerance=1e-11, file=tmp_path / "on.h5", progress=False
+    )
+    assert run.strain[0] == 0.0
+    assert [run.packing(0).time, run.packing(0).step] == [0.0, 0]
+    np.testing.assert_array_equal(run.packing(0).box.matrix, half.box.matrix)
+    tail = whole.stress[-len(run.stress) :]
+    np.testing.assert_allclose(run.stress, tail, atol=1e-7 * np.abs(tail).max())  # it unjams
+    back = js.quasistatic_shear(start=whole.packing(1), strain=-0.002, step=1e-3, progress=False)
+    assert back.strain.tolist() == [0, -0.001, -0.002]
+
+
+def test_cycles_and_a_strain_exclude_each_other():
+    discs = js.Spherocylinders(alpha=0)
+    for given, words in (
+        ({"amplitude": 0.1, "strain": 0.1}, "strain=0.1 has no effect with amplitude=0.1"),
+        ({"cycles": 3}, "cycles=3 has no effect without amplitude"),
+        ({"amplitude": 1e-4}, "expected at most the amplitude, 0.0001"),
+        ({"strain": 0.0}, "strain_end is 0.0"),
+        ({"amplitude": 5.0, "flow": "pure"}, "amplitude is 5.0"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            js.quasistatic_shear(discs, n=8, progress=False, **given)

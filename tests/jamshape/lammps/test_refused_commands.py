@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from dumps import read_dump
 
 import jamshape as js
 from jamshape.files.h5md import read_attributes, read_observables, read_packing
-from jamshape.files.lammps_text import read_dump
 from jamshape.flow import lammps_driver
 from jamshape.lammps.module import LammpsError
 from jamshape.lammps.session import Session

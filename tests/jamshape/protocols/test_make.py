@@ -7,7 +7,7 @@ import pytest
 from making import made, stage_of, write_every_mark
 from mixtures import bidisperse, monodisperse
 from squeezed import squeezed
-from written import write_columns
+from written import FINISHED, write_columns
 
 import jamshape as js
 from jamshape.contacts import coordination, find_contacts, find_rattlers, sum_forces
@@ -60,7 +60,7 @@ def compressed(out, packing=None):
     p = 0.3 * np.clip(phi - 0.85, 0, None)
     kappa = np.where(np.arange(60) < 50, 1e-6, -1e-6)
     rows = {"phi": phi, "pressure": p, "kappa": kappa}
-    write_columns(run_of(out), packing or start(), RECIPE.attributes() | {"finished": True}, rows)
+    write_columns(run_of(out), packing or start(), RECIPE.attributes() | FINISHED, rows)
 
 
 def assert_same_result(out, expected):
