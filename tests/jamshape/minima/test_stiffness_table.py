@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import jamshape as js
+from jamshape.checks import TimeLimitError
 from jamshape.commands.contents import contents_of
 from jamshape.commands.info import lines_of
 from jamshape.files.h5md import read_packing, write_run
@@ -69,6 +70,30 @@ def test_runs_keep_it(rested, tmp_path):
     last = slow.packing()
     assert last.law == rested.law
     assert slow["u"][-1] == pytest.approx(last.u, rel=1e-6)
+
+
+def test_the_shear_modulus_is_the_slope_of_the_stress(rested):
+    run = js.quasistatic_shear(start=rested, step=1e-7, strain=2e-7, progress=False)
+    slope = (run["p_xy"][-1] - run["p_xy"][0]) / 2e-7
+    found = js.modes(rested).moduli.simple_shear.relaxed
+    assert abs(slope) == pytest.approx(found, rel=1e-3)
+
+
+@pytest.mark.lammps
+@pytest.mark.parametrize("integrator", ["heun", "sdirk2"])
+def test_a_run_that_was_stopped_goes_on_with_it(rested, tmp_path, integrator):
+    def sheared(name, **more):
+        return js.shear(
+            start=rested, gdot=1e-3, strain=0.2, integrator=integrator, rows=50,
+            file=tmp_path / name, progress=False, **more,
+        )  # fmt: skip
+
+    whole = sheared("whole.h5")
+    with pytest.raises(TimeLimitError):
+        sheared("stopped.h5", seconds=1e-6)
+    again = sheared("stopped.h5")
+    np.testing.assert_array_equal(again["u"], whole["u"])
+    assert again.packing().law == whole.packing().law == rested.law
 
 
 @pytest.mark.lammps
