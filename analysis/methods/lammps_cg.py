@@ -8,7 +8,6 @@ from jamshape.lammps.session import Session
 from jamshape.landscape import Landscape
 from jamshape.minima import Descent, Outcome
 from jamshape.packing import State
-from jamshape.shapes.shape import Interaction
 
 _ITERATIONS = 100  # between two checks of the residual
 _IDLE = 3  # checks in a row without gain that end it
@@ -41,7 +40,7 @@ def lammps_cg(descent: Descent) -> Outcome:
 
 def _set_up(session: Session, landscape: Landscape, state: State, factor: float) -> None:
     packing = state.packing(landscape.particles)
-    law = Interaction(landscape.k_e * factor, landscape.sides)
+    law = packing.law.but(np.multiply(landscape.k_e, factor), landscape.sides)
     # Numbered so that they come back in order.
     session.load(packing.with_(id=1 + np.arange(packing.n)))
     session.interact(law)

@@ -190,7 +190,7 @@ template <class Model, int D>
 [[gnu::noinline]] std::unique_ptr<LocalEnergyModel> local_model_of(const ShapeOf<Model> &of,
                                                                    Coordinates names)
 {
-  return std::make_unique<VicinityOf<Model, D>>(of.shapes(), std::move(names), of.law());
+  return std::make_unique<VicinityOf<Model, D>>(of.shapes(), std::move(names), of.laws());
 }
 
 /// Gives each shape's class a method that makes the energy of its particles.

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace jamshape {
@@ -23,7 +24,31 @@ template <class Model> typename Model::Law law_of(double k_e, int sides)
   return Model::law(k_e, static_cast<Sides>(sides));
 }
 
-/// N particles of one shape, each with its own size, and the law of their contacts: the Python
+/// The laws of contacts for k_e (T, T) and species (N,), numbered from 1.
+template <class Model>
+Laws<typename Model::Law> laws_of(const Array2<double> &k_e, const Array1<std::int64_t> &species,
+                                  int sides)
+{
+  const std::size_t n = k_e.shape(0);
+  require(n > 0 && k_e.shape(1) == n, "k_e does not have the shape (T, T).");
+  std::vector<typename Model::Law> table;
+  for (std::size_t at = 0; at < n * n; ++at) {
+    require(k_e.data()[at] == k_e.data()[at % n * n + at / n],
+            "k_e is not symmetric, expected the same number for I J as for J I.");
+    table.push_back(law_of<Model>(k_e.data()[at], sides));
+  }
+  std::vector<std::size_t> kinds;
+  for (std::size_t i = 0; i < species.size(); ++i) {
+    const std::int64_t own = species.data()[i];
+    require(own >= 1 && static_cast<std::size_t>(own) <= n,
+            "species holds " + std::to_string(own) + ", expected numbers from 1 to " +
+                std::to_string(n) + ", the rows of k_e.");
+    kinds.push_back(static_cast<std::size_t>(own - 1));
+  }
+  return {n, std::move(table), std::move(kinds)};
+}
+
+/// N particles of one shape, each with its own size, and the laws of their contacts: the Python
 /// class of a shape. Its methods are bound in shapes.cpp, sums.cpp, derivatives.cpp, sweeps.cpp and
 /// local_energy_model.cpp, for every shape of shapes.hpp.
 template <class Model> class ShapeOf {
@@ -32,7 +57,21 @@ template <class Model> class ShapeOf {
   using Law = typename Model::Law;
 
   ShapeOf(const Array2<double> &diameters, const Array1<double> &exponent, int dimension,
-          double k_e, int sides) : space(dimension), contact_law(law_of<Model>(k_e, sides))
+          double k_e, int sides) :
+      ShapeOf(diameters, exponent, dimension, Laws<Law>(law_of<Model>(k_e, sides)))
+  {
+  }
+
+  /// k_e (T, T) by species (N,), numbered from 1.
+  ShapeOf(const Array2<double> &diameters, const Array1<double> &exponent, int dimension,
+          const Array2<double> &k_e, const Array1<std::int64_t> &species, int sides) :
+      ShapeOf(diameters, exponent, dimension, laws_of<Model>(k_e, species, sides))
+  {
+    require(species.size() == n(), "species does not have the shape (N,).");
+  }
+
+  ShapeOf(const Array2<double> &diameters, const Array1<double> &exponent, int dimension,
+          Laws<Law> laws) : space(dimension), contact_laws(std::move(laws))
   {
     require(dimension == 2 || dimension == 3,
             "dimension is " + std::to_string(dimension) + ", expected 2 or 3.");
@@ -51,7 +90,7 @@ template <class Model> class ShapeOf {
   std::size_t n() const { return particles.size(); }
   int dimension() const { return space; }
   const std::vector<Shape> &shapes() const { return particles; }
-  const Law &law() const { return contact_law; }
+  const Laws<Law> &laws() const { return contact_laws; }
 
   /// `visit(D)` for the dimension of the particles.
   template <class Visit> auto in_space(const Visit &visit) const
@@ -62,12 +101,12 @@ template <class Model> class ShapeOf {
   template <int D, class S> PosedPairs<Model, D, S> posed(const PairArrays &arrays) const
   {
     arrays.check(n(), D);
-    return {particles, arrays.poses(), arrays.list(), contact_law};
+    return {particles, arrays.poses(), arrays.list(), contact_laws};
   }
 
  private:
   int space;
-  Law contact_law;
+  Laws<Law> contact_laws;
   std::vector<Shape> particles;
 };
 

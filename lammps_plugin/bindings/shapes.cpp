@@ -212,6 +212,10 @@ template <class Model> void export_shape(nb::module_ &m)
       "exponent"_a, "dimension"_a, "k_e"_a, "sides"_a,
       "Particles of diameters (N, 3) and exponents (N,), ignored by shapes without them; sides is\n"
       "1 or 2, the bonds of a side-to-side contact, for shapes whose law supports both.");
+  of.def(nb::init<const Array2<double> &, const Array1<double> &, int, const Array2<double> &,
+                  const Array1<std::int64_t> &, int>(),
+         "diameters"_a, "exponent"_a, "dimension"_a, "k_e"_a, "species"_a, "sides"_a,
+         "The same with a symmetric k_e (T, T) by species (N,), numbered from 1.");
   of.attr("name") = Model::NAME;
   of.attr("core") = Model::CORE;
   of.attr("most_bonds") = Model::MOST_BONDS;

@@ -169,8 +169,9 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   using Shape = typename Model::Shape;
   using Law = typename Model::Law;
 
-  VicinityOf(std::vector<Shape> particle_shapes, Coordinates names, const Law &contact_law) :
-      shapes(std::move(particle_shapes)), coordinates(std::move(names)), law(contact_law)
+  VicinityOf(std::vector<Shape> particle_shapes, Coordinates names, Laws<Law> contact_laws) :
+      shapes(std::move(particle_shapes)), coordinates(std::move(names)),
+      laws(std::move(contact_laws))
   {
   }
 
@@ -364,7 +365,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   bool remembers = false;
   mutable std::vector<Start> starts;  // (M,) of `pairs`
   bool is_outrun = false;             // `pairs` do not hold at a point, and `wide` neither
-  Law law;
+  Laws<Law> laws;
   Poses held;
   Poses base;
   mutable Poses there;                   // at the last point
@@ -404,7 +405,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   {
     there = base;
     displace(there, at);
-    return {shapes, there.view(at.strain), list.list(), law};
+    return {shapes, there.view(at.strain), list.list(), laws};
   }
 
   /// The number of a pair, or -1, in the caller's numbering.

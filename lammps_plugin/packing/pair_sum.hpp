@@ -8,6 +8,7 @@
 #include "contact/packs.hpp"
 #include "contact/pair_derivatives.hpp"
 
+#include "packing/laws.hpp"
 #include "packing/split.hpp"
 #include "packing/team.hpp"
 
@@ -74,8 +75,9 @@ template <class Model, int D, class S> class PosedPairs {
   using Long = long double;
 
   PosedPairs(const std::vector<typename Model::Shape> &particle_shapes, const SplitPoses &at,
-             const PairList &list, const typename Model::Law &contact_law) :
-      shapes(particle_shapes), poses(at), pairs(list), law(contact_law)
+             const PairList &list, const Laws<typename Model::Law> &contact_laws) :
+      shapes(particle_shapes), poses(at), pairs(list), common(contact_laws.any()),
+      mixed(contact_laws.is_one() ? nullptr : &contact_laws)
   {
     body.reserve(shapes.size());
     around.reserve(shapes.size());
@@ -89,7 +91,13 @@ template <class Model, int D, class S> class PosedPairs {
 
   std::size_t size() const { return pairs.n; }
   std::size_t n_particles() const { return shapes.size(); }
-  const typename Model::Law &contact_law() const { return law; }
+  /// The law of a pair.
+  const typename Model::Law &law(std::size_t p) const
+  {
+    return mixed == nullptr ? common : mixed->of(first(p), second(p));
+  }
+  /// One of the laws, which differ in k_e only.
+  const typename Model::Law &any_law() const { return common; }
   std::size_t first(std::size_t p) const { return pairs.particles[2 * p]; }
   std::size_t second(std::size_t p) const { return pairs.particles[2 * p + 1]; }
 
@@ -136,7 +144,7 @@ template <class Model, int D, class S> class PosedPairs {
   ContactOf<Model, D, S> contact(std::size_t p, const Vec<D, S> &r,
                                  StartIn<Model, D, S> *start = nullptr) const
   {
-    const auto found = detail::contact_begun(first_body(p, r), second_body(p), law, start);
+    const auto found = detail::contact_begun(first_body(p, r), second_body(p), law(p), start);
     return to_its_digits(p, found);
   }
 
@@ -160,7 +168,7 @@ template <class Model, int D, class S> class PosedPairs {
             separation_in<Long>(p),
             orientation_in<Long>(i),
             orientation_in<Long>(j),
-            law};
+            law(p)};
   }
 
   /// Whether packs support all of these particles.
@@ -199,7 +207,8 @@ template <class Model, int D, class S> class PosedPairs {
   const std::vector<typename Model::Shape> &shapes;
   SplitPoses poses;
   PairList pairs;
-  typename Model::Law law;
+  typename Model::Law common;
+  const Laws<typename Model::Law> *mixed;                 // null if one law is that of all pairs
   std::vector<typename Model::template Body<D, S>> body;  // at the origin
   std::vector<double> around;                             // radii of the bounding spheres
 
@@ -257,8 +266,7 @@ template <class Model, int D, class S> class TurnedBodies {
   {
     auto body_i = as_i[pairs.first(p)];
     body_i.centre = as_variables<D, S>(pairs.separation(p));
-    const auto found =
-        detail::contact_begun(body_i, as_j[pairs.second(p)], pairs.contact_law(), start);
+    const auto found = detail::contact_begun(body_i, as_j[pairs.second(p)], pairs.law(p), start);
     return pairs.to_its_digits(p, found);
   }
 
@@ -341,7 +349,7 @@ template <int D, class S> struct PairSums {
 template <class Model, int D>
 FindContacts<Model, D> *packs_for(const PosedPairs<Model, D, double> &pairs)
 {
-  if (!pairs.contact_law().shortcuts || !pairs.packs_take_all()) return nullptr;
+  if (!pairs.any_law().shortcuts || !pairs.packs_take_all()) return nullptr;
   return PacksOf<Model, D>::of(required_instruction_set());
 }
 
@@ -371,14 +379,14 @@ template <class Model, int D> class NumberedBlock {
       }
       number[block.n] = p;
       block.add(static_cast<int>(pairs.first(p)), static_cast<int>(pairs.second(p)), r,
-                Model::k_e(pairs.contact_law()));
+                Model::k_e(pairs.law(p)));
     }
     return p;
   }
 
   void add_to(PairSums<D, double> &sums, FindContacts<Model, D> &find)
   {
-    find(pairs.bodies(), pairs.contact_law(), block);
+    find(pairs.bodies(), pairs.any_law(), block);
     block.for_each(block.touching & ~block.alone, [&](int k) { sums.add(block, k); });
     if constexpr (HAS_START) {
       for (int k = 0; starts != nullptr && k < block.n; ++k) starts[number[k]] = block.start_of(k);

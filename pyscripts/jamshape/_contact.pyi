@@ -8,7 +8,7 @@ w i j k, semi-axes, exponent p.
 """
 
 from collections.abc import Callable
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, ClassVar, TypeAlias, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,8 +36,19 @@ class _Shape:
     turning_radius: _Reals
     symmetry_axis: _Ints
     director: _Ints
+    @overload
     def __init__(
         self, diameters: _Reals, exponent: _Reals, dimension: int, k_e: float, sides: int
+    ) -> None: ...
+    @overload
+    def __init__(
+        self,
+        diameters: _Reals,
+        exponent: _Reals,
+        dimension: int,
+        k_e: _Reals,
+        species: _Ints,
+        sides: int,
     ) -> None: ...
     def host_spin(self, orientation: _Reals, gradient: _Reals) -> _Reals: ...
     def near(

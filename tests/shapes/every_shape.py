@@ -181,6 +181,12 @@ def laws(packing):
     return (1, 2) if packing.compiled().has_sides else (SIDES,)
 
 
+def stiffnesses(packing):
+    """A k_e of its own for each pair of species."""
+    own = 1.0 + np.arange(packing.species.max())
+    return np.add.outer(own, own) + 0.5 * np.multiply.outer(own, own)
+
+
 def turned_as_a_whole(packing, seed=4):
     """An open cluster turned about its origin, and the rotation as a matrix."""
     rng, D = np.random.default_rng(seed), packing.dimension

@@ -17,6 +17,7 @@ from every_shape import (
     pressed,
     sheared,
     size_of,
+    stiffnesses,
 )
 from slopes import assert_is_slope
 
@@ -42,8 +43,9 @@ def step_of(landscape):
 
 
 def by_each_law(packing):
-    """Landscapes of a stiffness other than 1."""
-    return [Landscape(packing, 2.5, sides) for sides in laws(packing)]
+    """Landscapes of a stiffness other than 1, and of one for each pair of species."""
+    of_one = [Landscape(packing, 2.5, sides) for sides in laws(packing)]
+    return [*of_one, Landscape(packing, stiffnesses(packing), SIDES)]
 
 
 def test_the_gradient_is_the_slope_of_the_energy(packing, measured):
@@ -71,7 +73,12 @@ def require_gradient(landscape, packing, measured):
 
 
 def test_the_hessian_is_the_slope_of_the_gradient(packing, measured):
-    landscape, state = Landscape(packing), State.of(packing)
+    for landscape in (Landscape(packing), Landscape(packing, stiffnesses(packing))):
+        require_hessian(landscape, packing, measured)
+
+
+def require_hessian(landscape, packing, measured):
+    state = State.of(packing)
     hessian, h = landscape.curvature(state, extended=True).hessian, step_of(landscape)
     scale, size = np.abs(hessian).max(), np.abs(packing.position).max()
 
@@ -116,7 +123,7 @@ def test_the_virial_is_the_slope_of_the_energy_by_every_strain(packing):
 
 
 def require_virial(landscape, packing):
-    state, found = State.of(packing), forces(packing, 2.5, landscape.sides)
+    state, found = State.of(packing), forces(packing, landscape.k_e, landscape.sides)
     scale = np.abs(found.virial).max()
     assert np.trace(found.virial) / (packing.dimension * packing.box.volume) == close_to(
         found.pressure, 4 * EPS
@@ -192,7 +199,7 @@ def test_the_landscape_is_the_sum_of_the_contacts(packing):
 
 
 def require_sum_of_contacts(landscape, packing):
-    network = find_contacts(packing, 2.5, landscape.sides)
+    network = find_contacts(packing, landscape.k_e, landscape.sides)
     found = sum_forces(packing, network)
     here = landscape.evaluate(State.of(packing))
     components, D = landscape.components(here.gradient), packing.dimension

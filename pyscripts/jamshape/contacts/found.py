@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+from numpy.typing import ArrayLike
+
 from jamshape.arrays import BoolArray, FloatArray, IntArray
 from jamshape.contacts.network import Bonds, ContactNetwork, find_contacts
 from jamshape.contacts.rattlers import Coordination, coordination, find_rattlers
@@ -29,7 +31,9 @@ class Contacts(Record):
     rattlers: BoolArray
 
     @classmethod
-    def of(cls, packing: Packing, k_e: float | None = None, sides: int | None = None) -> Contacts:
+    def of(
+        cls, packing: Packing, k_e: ArrayLike | None = None, sides: int | None = None
+    ) -> Contacts:
         """Find the contacts; arguments and errors as `find_contacts`."""
         network = find_contacts(packing, k_e, sides)
         return cls(packing, network, find_rattlers(packing, network))

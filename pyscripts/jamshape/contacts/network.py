@@ -10,7 +10,7 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from jamshape.arrays import BoolArray, FloatArray, IntArray
 from jamshape.contacts.near import NearPairs, PairArrays, near_particles
@@ -156,7 +156,11 @@ class Forces:
 
 
 def find_contacts(
-    packing: Packing, k_e: float | None = None, sides: int | None = None, *, errors: bool = False
+    packing: Packing,
+    k_e: ArrayLike | None = None,
+    sides: int | None = None,
+    *,
+    errors: bool = False,
 ) -> ContactNetwork:
     """Find all contacts, including those with periodic images.
 
@@ -164,7 +168,7 @@ def find_contacts(
     ----------
     packing : Packing
         Positions need not lie in the box.
-    k_e : float, [energy], optional
+    k_e : float or (T, T) array_like, [energy], optional
     sides : {1, 2}, optional
         Bonds of a side-to-side contact, of shapes that have both laws: one in the dynamics of Marschall
         & Teitel, two for minima and modes. Both are those of the packing's law by default.
@@ -211,7 +215,7 @@ def find_contacts(
     )
 
 
-def forces(packing: Packing, k_e: float | None = None, sides: int | None = None) -> Forces:
+def forces(packing: Packing, k_e: ArrayLike | None = None, sides: int | None = None) -> Forces:
     """Sum energy, forces, torques and pressure; arguments and errors as `find_contacts`."""
     return sum_forces(packing, find_contacts(packing, k_e, sides))
 

@@ -12,6 +12,7 @@ single-precision numbers, these take precedence: see `jamshape.exchange.edited`.
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Iterable, Mapping
 from functools import lru_cache, singledispatch
@@ -156,7 +157,7 @@ def _frame(hoomd: Any, packing: Packing, form: Form) -> Any:
     of_box = box_fields(packing, rests=form.rests, tilted=form.tilted)
     exact |= {_LOG + name: x for name, x in of_box.items()}
     exact[_LOG + "time"] = np.array([packing.time])
-    exact[_LOG + "law"] = np.array(packing.law, np.float64)
+    exact[_LOG + "law"] = np.array([*np.ravel(packing.law.k_e), packing.law.sides])
     # As numbers: OVITO before 3.17 fails on texts.
     exact[_LOG + "shape_style"] = np.frombuffer(packing.shape_style.encode(), np.uint8)
     frame.log = exact
@@ -238,8 +239,10 @@ def _packing(path: PathLike, hoomd: Any, frame: Any) -> Packing:
         columns = [name for name in found if name.startswith(_COLUMNS)]
         found["columns"] = {name.removeprefix(_COLUMNS): found.pop(name) for name in columns}
         if "law" in found:  # missing in files of 0.1.0
-            k_e, sides = found["law"].tolist()
-            found["law"] = Interaction(k_e, sides)
+            *numbers, sides = found["law"].tolist()
+            n = math.isqrt(len(numbers))
+            k_e = np.reshape(numbers, (n, n)) if n > 1 else numbers[0]
+            found["law"] = Interaction.told({"k_e": k_e, "sides": sides})
         packing = packing_of(found, style, int(frame.configuration.step), time)
         return as_edited(packing, _frame(hoomd, packing, Form.of(packing)), frame)
     except (KeyError, TypeError) as error:

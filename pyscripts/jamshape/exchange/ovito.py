@@ -23,7 +23,7 @@ from jamshape.files.frames import as_rest
 from jamshape.files.hdf5 import FileFormatError
 from jamshape.packing import Lengths, Packing, angle_from_quaternion
 from jamshape.packing.rotation import product
-from jamshape.shapes.shape import Interaction
+from jamshape.shapes.shape import Interaction, stiffness_text, stiffness_told
 from jamshape.shapes.solid import RoundedSegment, Solid, Superquadric
 
 _PREFIX = "Jamshape "
@@ -103,7 +103,7 @@ def to_ovito(packing: Packing, rattlers: BoolArray | None = None) -> Any:
     data.attributes["Timestep"], data.attributes["Time"] = packing.step, packing.time
     data.attributes[_PREFIX + "shape style"] = packing.shape_style
     for name, value in packing.law._asdict().items():
-        data.attributes[_PREFIX + name] = value
+        data.attributes[_PREFIX + name] = stiffness_text(value) if np.ndim(value) else value
     for field, titles in _rests_of_box(packing.dimension).items():
         for title, rest in zip(titles, getattr(packing, field).tolist(), strict=True):
             data.attributes[title] = rest
@@ -149,6 +149,8 @@ def from_ovito(data: Any) -> Packing:
                 fields[f"{name}_rest"] = as_rest(fields[f"{name}_rest"], fields[name])
         # Data of 0.1.0 have no law.
         law = {name: known.get(_PREFIX + name) for name in Interaction._fields}
+        if isinstance(law["k_e"], str):  # a table
+            law["k_e"] = stiffness_told(law["k_e"])
         fields["law"] = Interaction.told({k: v for k, v in law.items() if v is not None})
         style = str(known[_PREFIX + "shape style"])
         packing = packing_of(fields, style, int(known["Timestep"]), float(known["Time"]))

@@ -49,7 +49,7 @@ from jamshape.files.signature import DUMP, GSD, HDF5, REFUSED, format_of
 from jamshape.files.unpacked import opened_plain
 from jamshape.packing import Box, Lengths, Packing, angle_from_quaternion, cuboid_around
 from jamshape.packing.columns import flat, joined
-from jamshape.shapes.shape import Interaction
+from jamshape.shapes.shape import Stiffness, stiffness_of, stiffness_text, stiffness_told
 from jamshape.shapes.table import SHAPES
 
 _TITLE = "LAMMPS data file by jamshape"
@@ -134,6 +134,7 @@ def write_data(path: PathLike, packing: Packing, density: float = 1.0) -> None:
     ellipsoids = np.column_stack([packing.id, packing.diameters, packing.quaternions])
     with replacing(path) as temporary, temporary.open("w", encoding="ascii") as file:
         file.write(_header_text(packing))
+        file.write(_pairs_text(packing))
         file.write("\nAtoms # ellipsoid\n\n")
         np.savetxt(file, atoms, fmt=["%d"] * 3 + ["%.17g"] * 4 + ["%d"] * 3)
         file.write("\nEllipsoids\n\n")
@@ -358,8 +359,21 @@ def _header_text(packing: Packing) -> str:
         tilt = [*packing.box.tilt.tolist(), 0.0, 0.0][:3]
         sides.append(" ".join(f"{x:.17g}" for x in tilt) + " xy xz yz")
     told = {"shape": packing.shape_style, "dimension": packing.dimension, **packing.law._asdict()}
+    told["k_e"] = stiffness_text(packing.law.k_e)
     title = f"{_TITLE} # " + " ".join(f"{name}={value}" for name, value in told.items())
     return "\n".join([title, "", *counts, "", *sides, ""])
+
+
+def _pairs_text(packing: Packing) -> str:
+    """Return the section of a table of k_e for LAMMPS, if types of its pair style are the species."""
+    if not isinstance(packing.law.k_e, tuple):
+        return ""
+    style = packing.shape.style(packing, packing.law)
+    if not np.array_equal(style.types, packing.species):
+        return ""
+    name, *commands = (line.split()[1:] for line in style.commands.splitlines())
+    rows = {tuple(row[:2]): " ".join(row) for row in commands}  # later ones hold exponents
+    return "\n".join([f"\nPairIJ Coeffs # {name[0]}", "", *rows.values(), ""])
 
 
 def _packing(path: PathLike, frame: _Frame, wanted: Wanted) -> Packing:
@@ -624,7 +638,12 @@ def _said(text: str, sections: Mapping[str, _Section], columns: dict[str, FloatA
     first = text.partition("\n")[0]
     if first.startswith(_TITLE) and "#" in first:
         words = dict(word.split("=", 1) for word in first.split("#")[1].split() if "=" in word)
-        law = {name: float(words[name]) for name in Interaction._fields if name in words}
+        law: dict[str, Any] = {"sides": float(words["sides"])} if "sides" in words else {}
+        law |= {"k_e": stiffness_told(words["k_e"])} if "k_e" in words else {}
+        rows = sections["PairIJ Coeffs"].rows if "PairIJ Coeffs" in sections else []
+        if not all(_is_of(law.get("k_e", 1.0), row.split()) for row in rows):
+            msg = "PairIJ Coeffs differ from k_e in the first line, expected both to agree; change both"
+            raise ValueError(msg)
         dimension = int(words["dimension"]) if "dimension" in words else None
         return Said(dimension, words.get("shape", ""), law, is_ours=True)
     for name, n_types in _PAIRS.items():
@@ -638,18 +657,43 @@ def _of_pairs(
     shape: str, rows: Sequence[Sequence[str]], n_types: int, columns: dict[str, FloatArray]
 ) -> Said:
     """Read the coefficients of our pair styles, as LAMMPS's `write_data` writes them."""
-    stiffness = {float(row[n_types]) for row in rows}
-    if len(stiffness) != 1:
-        msg = (
-            f"pair coefficients have the stiffnesses k_e {sorted(stiffness)}, expected a single one for all;"
-            " remove the section Pair Coeffs to read only the particles"
-        )
-        raise ValueError(msg)
+    k_e = _stiffness(rows, n_types)
     own = {int(row[0]): row for row in rows if len(set(row[:n_types])) == 1}
     if SHAPES[shape].has_exponent and "exponent" not in columns:
         p = {kind: float(row[n_types + 1]) for kind, row in own.items() if len(row) > n_types + 1}
         columns["exponent"] = np.array([p.get(int(kind), 1.0) for kind in columns["type"]])
-    return Said(shape=shape, law={"k_e": stiffness.pop()})
+    return Said(shape=shape, law={"k_e": k_e})
+
+
+def _is_of(k_e: Stiffness, row: Sequence[str]) -> bool:
+    """Return whether a row I J k_e agrees with known stiffnesses."""
+    i, j = (int(kind) - 1 for kind in row[:2])
+    if not isinstance(k_e, tuple):
+        return float(row[2]) == k_e
+    return max(i, j) < len(k_e) and float(row[2]) == k_e[i][j]
+
+
+def _stiffness(rows: Sequence[Sequence[str]], n_types: int) -> Stiffness:
+    """Return k_e from the rows of Pair Coeffs, which LAMMPS mixes for unlike types, or PairIJ Coeffs."""
+    found = {tuple(map(int, row[:n_types])): float(row[n_types]) for row in rows}
+    types = range(1, max(map(max, found), default=0) + 1)
+    pairs = [(i, j) if n_types == 2 else (i,) for i in types for j in types[i - 1 :]]
+    if not found or set(pairs) != set(found):
+        msg = f"pair coefficients have {len(found)} rows for {len(types)} types, expected {len(set(pairs)) or 'some'}"
+        raise ValueError(msg)
+    if len(set(found.values())) == 1:
+        return next(iter(found.values()))
+    if n_types == 1:
+        said = (
+            "Pair Coeffs state k_e of equal types only: that of unlike ones is the geometric mean, as LAMMPS reads it; write"
+            " the file with 'write_data FILE pair ij' to keep others"
+        )
+        warnings.warn(said, stacklevel=2)
+        own = np.array([found[(i,)] for i in types])
+        table = np.sqrt(np.multiply.outer(own, own))
+        np.fill_diagonal(table, own)
+        return stiffness_of(table)
+    return stiffness_of([[found[min(i, j), max(i, j)] for j in types] for i in types])
 
 
 def _digits(rows: Sequence[str], names: Sequence[str], place: Sequence[str] = _POSITION) -> int:

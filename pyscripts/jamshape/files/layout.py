@@ -217,6 +217,8 @@ def _read_law(file: h5py.File) -> Interaction:
     for place in filter(lambda name: has_item(file, name), ("parameters", "particles/all")):
         group = require_item(file, place)
         known |= {k: attribute(group, k) for k in Interaction._fields if k in group.attrs}
+        if "k_e" in group:  # a large table
+            known["k_e"] = require_dataset(group, "k_e")[()]
     try:
         return Interaction.told(known)
     except (TypeError, ValueError) as error:

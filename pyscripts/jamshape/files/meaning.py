@@ -10,7 +10,7 @@ import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from jamshape.arrays import FloatArray
 from jamshape.files.disk import PathLike
 from jamshape.packing import Packing
 from jamshape.packing.rotation import product
-from jamshape.shapes.shape import Interaction
+from jamshape.shapes.shape import Interaction, stiffness_text
 from jamshape.shapes.table import SHAPES, Fitted, fitted, shape_named
 
 _ROUNDING = 1e-9  # of a length over a diameter, of a quaternion over its norm
@@ -44,7 +44,7 @@ class Said:
 
     dimension: int | None = None
     shape: str = ""
-    law: Mapping[str, float] = field(default_factory=dict)
+    law: Mapping[str, Any] = field(default_factory=dict)
     """k_e and sides, if stated."""
     has_exponent: bool = False
     """Whether the file has exponents."""
@@ -210,9 +210,10 @@ def _dimension(there: Geometry, told: int | None) -> tuple[int, str]:
 
 def _of_shape(path: PathLike, name: str, dimension: int, law: Interaction) -> str:
     bonds = {1: "one bond", 2: "two bonds"}[law.sides]
+    k_e = stiffness_text(law.k_e).removesuffix(".0")
     return (
         f"{path} does not state the shape of its particles: they are read as {name}s in {dimension}D with"
-        f" k_e = {law.k_e:g} and {bonds} side to side"
+        f" k_e = {k_e} and {bonds} side to side"
     )
 
 

@@ -517,7 +517,7 @@ class ImplicitFlow:
     def _falls_too_far(self, now: Evaluation, before: Evaluation) -> bool:
         # Contacts no stronger than the drag of the box motion open and close without an event.
         push = self.host.rate * self._least_drag * float(self.flow.state.edges.max())
-        least = self.landscape.particles.n * (push * self.size) ** 2 / self.landscape.k_e
+        least = self.landscape.particles.n * (push * self.size) ** 2 / self.landscape.stiffness
         return before.energy - now.energy > self.protocol.largest_drop * max(before.energy, least)
 
     @property
@@ -527,7 +527,7 @@ class ImplicitFlow:
     @property
     def _stable(self) -> float:
         """Estimate the longest explicit step, [time]: drag over stiffness of a contact or two."""
-        return _EXPLICIT_BELOW * self._least_drag * self.size**2 / self.landscape.k_e
+        return _EXPLICIT_BELOW * self._least_drag * self.size**2 / self.landscape.stiffness
 
     def _begin(self, here: Evaluation) -> None:
         flow = self.flow
@@ -543,7 +543,7 @@ class ImplicitFlow:
     def _unit(self, evaluation: Evaluation) -> float:
         """Typical overlap, at least that caused by drag on a particle a diameter from the centre."""
         least = self.host.rate * self._least_drag * self.size
-        return max(evaluation.bond_force, least) * self.size**2 / self.landscape.k_e
+        return max(evaluation.bond_force, least) * self.size**2 / self.landscape.stiffness
 
     def _rms(self, vector: FloatArray) -> float:
         """Root mean square over particles of an (n,) vector of coordinates."""
@@ -552,8 +552,8 @@ class ImplicitFlow:
     def _units(self, evaluation: Evaluation) -> Units:
         overlap = self._unit(evaluation)
         bonds = max(evaluation.n_bonds, self.landscape.particles.n)
-        energy = bonds * self.landscape.k_e * (overlap / self.size) ** 2
-        force = self.landscape.k_e * overlap / self.size**2
+        energy = bonds * self.landscape.stiffness * (overlap / self.size) ** 2
+        force = self.landscape.stiffness * overlap / self.size**2
         return Units(force, energy, math.sqrt(overlap * self.size), self.landscape.particles.n)
 
     def _is_extended(self, unit: float) -> bool:

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
+import numpy as np
+
 from jamshape.checks import require_one_of, require_positive
 from jamshape.files.checkpoint import Checkpoint
 from jamshape.lammps.module import one_at_a_time
 from jamshape.packing import Packing
-from jamshape.shapes.shape import Interaction
+from jamshape.shapes.shape import Interaction, Stiffness, stiffness_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -45,7 +47,7 @@ class Motion(ABC):
     sides
         Bonds of a side-to-side contact, 1 or 2.
     k_e, k_d
-        Stiffness [energy] and drag [energy time / length^(D + 2)].
+        Stiffness [energy], of each pair of species as in `Interaction`, and drag [energy time / length^(D + 2)].
     integrator
         One of `INTEGRATORS`.
     tolerance
@@ -60,7 +62,7 @@ class Motion(ABC):
 
     dt: float = 0.05
     sides: int = 1
-    k_e: float = 1.0
+    k_e: Stiffness = 1.0
     k_d: float = 1.0
     integrator: str = "heun"
     tolerance: float = 1e-4
@@ -75,14 +77,16 @@ class Motion(ABC):
     """Name in messages."""
 
     def __post_init__(self) -> None:
-        require_positive(
-            **{name: getattr(self, name) for name in ("dt", "k_e", "k_d", "tolerance")}
-        )
+        numbers = ("dt", "k_d", "tolerance", *(() if np.ndim(self.k_e) else ("k_e",)))
+        require_positive(**{name: getattr(self, name) for name in numbers})
+        object.__setattr__(self, "k_e", stiffness_of(self.k_e))
         require_one_of("sides", self.sides, (1, 2))
         # It becomes LAMMPS input, and may come from a file.
         require_one_of("integrator", self.integrator, INTEGRATORS)
         for f in dataclasses.fields(self):
-            if isinstance(f.default, float):  # not a NumPy scalar, which LAMMPS cannot read
+            if (
+                isinstance(f.default, float) and f.name != "k_e"
+            ):  # not a NumPy scalar, which LAMMPS cannot read
                 object.__setattr__(self, f.name, float(getattr(self, f.name)))
 
     @property

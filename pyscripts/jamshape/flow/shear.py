@@ -8,6 +8,8 @@ from abc import abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
+import numpy as np
+
 from jamshape.checks import MOST_STEPS, RANGES, require_in, require_one_of, require_positive
 from jamshape.flow.motion import FlowRun, Motion
 
@@ -71,10 +73,10 @@ class Shearing(Motion):
         """Estimate the drag on a particle held by others, over the strength of one contact.
 
         The drag is that at the host's velocity at its outer radius; a harmonic contact bears its
-        stiffness over the distance of first touch.
+        stiffness, the smallest of a table, over the distance of first touch.
         """
         pull = self.k_d * packing.measures * self.gdot * packing.outer_radius
-        return float((2 * pull * packing.inner_radius).max() / self.k_e)
+        return float((2 * pull * packing.inner_radius).max() / np.min(self.k_e))
 
     def warning(self, packing: Packing) -> str:
         """Return a warning if the rate may drive particles through each other, else an empty text."""

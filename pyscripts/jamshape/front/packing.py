@@ -112,7 +112,7 @@ class Packing(PackingLike):
         species: ArrayLike | None = None,
         id: ArrayLike | None = None,  # noqa: A002 - its name in LAMMPS
         image: ArrayLike | None = None,
-        k_e: float | None = None,
+        k_e: ArrayLike | None = None,
         sides: int | None = None,
         **parameters: ArrayLike,
     ) -> Self:
@@ -140,8 +140,8 @@ class Packing(PackingLike):
             LAMMPS IDs; 1 to N by default.
         image : (N, D) array_like, optional
             Periodic image counts; zeros by default.
-        k_e : float, [energy], optional
-            Stiffness of the contacts; 1 by default.
+        k_e : float or (T, T) array_like, [energy], optional
+            Stiffness of the contacts; 1 by default. A symmetric table has one for each pair of species, as ``pair_coeff I J``.
         sides : {1, 2}, optional
             Bonds of a side-to-side contact; 2 by default.
         **parameters : float or (N,) array_like

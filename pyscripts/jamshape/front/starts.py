@@ -16,7 +16,7 @@ from jamshape.front.reading import Held, packing_of
 from jamshape.packing import Packing as PackingLike
 from jamshape.protocols.random_start import random_packing, start_below
 from jamshape.shapes.particles import Particles
-from jamshape.shapes.shape import Interaction
+from jamshape.shapes.shape import Interaction, Stiffness, stiffness_text
 
 
 def start_of(start: Held, sides: int = 2) -> Packing:
@@ -50,8 +50,10 @@ def told_of(start: Packing) -> dict[str, Any]:
 
 
 def digest(start: PackingLike) -> str:
-    """Name a packing without a file by its poses, to distinguish it from another one."""
+    """Name a packing without a file by its poses, and k_e other than 1, to distinguish it from another one."""
     poses = b"".join(np.ascontiguousarray(x, np.float64).tobytes() for x in start.poses())
+    if start.law.k_e != Interaction().k_e:
+        poses += stiffness_text(start.law.k_e).encode()
     return f"packing {hashlib.blake2b(poses, digest_size=8).hexdigest()}"
 
 
@@ -102,7 +104,7 @@ class Start(NamedTuple):
         return cls(known, particles, **numbers, phi_name=phi_name)
 
     @property
-    def k_e(self) -> float:
+    def k_e(self) -> Stiffness:
         """Stiffness of the contacts, [energy]."""
         return self.known.law.k_e if self.known else Interaction().k_e
 

@@ -208,11 +208,12 @@ class Session:
         """Load a packing into a fresh instance; LAMMPS types are those of `Shape.style`, its IDs 1 to N."""
         self.commands(f"{_ATOMS}\ndimension {packing.dimension}")
         self._like = packing
-        types = packing.shape.style(packing, Interaction()).types
+        one = packing.with_(law=Interaction())  # set by `interact`
+        types = one.shape.style(one, one.law).types
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "start.data"
             rank = 1 + np.argsort(np.argsort(packing.id))
-            write_data(path, packing.with_(species=types, id=rank))
+            write_data(path, one.with_(species=types, id=rank))
             if packing.box.is_tilted:
                 self.commands("box tilt large")
             # Through a descriptor, since LAMMPS interprets `$`, `*` and quotes in names.

@@ -12,13 +12,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from jamshape.arrays import BoolArray, FloatArray, IntArray
 from jamshape.contacts import PairArrays, Pairs, find_contacts, find_rattlers
 from jamshape.contacts.near import near_particles, nearer
 from jamshape.contacts.network import refuse_crossing, refuse_unconverged
 from jamshape.packing import Packing, State
+from jamshape.shapes.shape import Stiffness
 
 _SKIN = 0.3  # of the pair list, over the smallest radius
 _WIDE = 5.0  # skin of the wide list over that
@@ -55,7 +56,7 @@ class Landscape:
     ----------
     packing : Packing
         Provides shapes and law.
-    k_e : float, [energy], optional
+    k_e : float or (T, T) array_like, [energy], optional
     sides : {1, 2}, optional
         Bonds of a side-to-side contact, of shapes that have both laws; minima exist for 2 only. Both are
         those of the packing's law by default.
@@ -66,7 +67,7 @@ class Landscape:
     """
 
     def __init__(
-        self, packing: Packing, k_e: float | None = None, sides: int | None = None
+        self, packing: Packing, k_e: ArrayLike | None = None, sides: int | None = None
     ) -> None:
         law = packing.law.but(k_e, sides)
         self.particles, self.k_e, self.sides = packing, law.k_e, law.sides
@@ -75,8 +76,13 @@ class Landscape:
         self._pairs: Pairs | None = None
         self._wide: Pairs | None = None
 
-    def __reduce__(self) -> tuple[type[Landscape], tuple[Packing, float, int]]:
+    def __reduce__(self) -> tuple[type[Landscape], tuple[Packing, Stiffness, int]]:
         return type(self), (self.particles, self.k_e, self.sides)
+
+    @cached_property
+    def stiffness(self) -> float:
+        """The unit of energy: k_e, the largest one of a table."""
+        return float(np.max(self.k_e))
 
     @cached_property
     def rotation_length(self) -> FloatArray:

@@ -45,5 +45,5 @@ def least_shift(landscape: Landscape, evaluation: Evaluation) -> float:
     superlinearly, and never exceeds the initial one.
     """
     force = float(np.abs(evaluation.gradient).max(initial=0.0))
-    first = _FIRST_SHIFT * landscape.k_e / landscape.length**2
+    first = _FIRST_SHIFT * landscape.stiffness / landscape.length**2
     return max(min(first, force / landscape.length), 1e-300)

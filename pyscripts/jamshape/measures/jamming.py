@@ -11,6 +11,8 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
+from numpy.typing import ArrayLike
+
 from jamshape.checks import NotReachedWarning
 from jamshape.contacts.network import CrossingError
 from jamshape.landscape import Landscape
@@ -150,14 +152,14 @@ class Jamming(NamedTuple):
         return f"{onset} is the onset of flow and not of jamming: {told}"
 
 
-def stays_jammed(packing: Packing, k_e: float | None = None) -> bool | None:
+def stays_jammed(packing: Packing, k_e: ArrayLike | None = None) -> bool | None:
     """Return whether a state keeps energy in balanced contacts when minimised at fixed box.
 
     Parameters
     ----------
     packing : Packing
         Minimised with two bonds side to side, whatever its law: with one there are no minima.
-    k_e : float, [energy], optional
+    k_e : float or (T, T) array_like, [energy], optional
         That of the packing's law by default.
 
     Returns
@@ -174,7 +176,7 @@ def stays_jammed(packing: Packing, k_e: float | None = None) -> bool | None:
     True
     """
     landscape, state = Landscape(packing, k_e, sides=2), State.of(packing)
-    lowest = _LOWEST * landscape.k_e / landscape.length**packing.dimension
+    lowest = _LOWEST * landscape.stiffness / landscape.length**packing.dimension
     stop = Stop(tolerance=_TOLERANCE, lowest=lowest, evaluations=_EVALUATIONS)
     try:
         found = minimise(landscape, state, "auto", stop)
@@ -186,7 +188,7 @@ def stays_jammed(packing: Packing, k_e: float | None = None) -> bool | None:
 
 
 def minimised_frames(
-    count: int, read: Callable[[int], Packing], k_e: float | None = None
+    count: int, read: Callable[[int], Packing], k_e: ArrayLike | None = None
 ) -> Iterator[Tried]:
     """Minimise frames of a compression from the densest down, until one unjams.
 
@@ -199,7 +201,7 @@ def minimised_frames(
         Number of frames.
     read : callable
         Returns a frame by its number, from 0.
-    k_e : float, [energy], optional
+    k_e : float or (T, T) array_like, [energy], optional
         By default that of the law of each frame.
 
     Yields

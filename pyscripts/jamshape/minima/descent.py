@@ -152,7 +152,7 @@ def rounding_floor(evaluation: Evaluation, landscape: Landscape, *, extended: bo
 def rounding_of_a_bond(landscape: Landscape, *, extended: bool = True) -> float:
     """Force error due to rounding of the coordinates, [energy / length]."""
     eps = float(np.finfo(np.longdouble if extended else np.float64).eps)
-    return 8 * eps * landscape.k_e / float(landscape.inner_radius.max())
+    return 8 * eps * landscape.stiffness / float(landscape.inner_radius.max())
 
 
 class Descent:
@@ -162,7 +162,7 @@ class Descent:
         self, landscape: Landscape, start: State, stop: Stop, history: History | None = None
     ) -> None:
         self.landscape, self.stop = landscape, stop
-        unit = landscape.k_e / landscape.length**start.dimension
+        unit = landscape.stiffness / landscape.length**start.dimension
         self.lowest = _LOWEST * unit if stop.lowest is None else stop.lowest
         self.history = history or History()
         self.state = start

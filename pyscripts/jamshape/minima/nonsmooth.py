@@ -95,7 +95,7 @@ class Corner:
     @property
     def overlap(self) -> float:
         """Mean overlap of a bond, [length]."""
-        unit = self.landscape.length**2 / self.landscape.k_e
+        unit = self.landscape.length**2 / self.landscape.stiffness
         return self.pieces[0].evaluation.bond_force * unit
 
     @property

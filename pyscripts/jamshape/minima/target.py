@@ -143,7 +143,9 @@ Goal = Target | FixedBox
 
 def _stiffness(landscape: Landscape) -> float:
     """Estimate the energy density of a jammed packing over the squared strain from jamming."""
-    return landscape.k_e / float(landscape.inner_radius.max()) ** landscape.particles.dimension
+    return (
+        landscape.stiffness / float(landscape.inner_radius.max()) ** landscape.particles.dimension
+    )
 
 
 @dataclass(eq=False)
@@ -470,7 +472,7 @@ def _judged(landscape: Landscape, at: Minimum, target: Target) -> Minimum:
     if at.residual.largest > _SLIDING:
         return replace(at, outcome=Outcome.STALLED)  # sufficient only for a step on the way
     local_model = LocalEnergyModel(landscape, at.state)
-    newton = local_model.newton(_SOFT * landscape.k_e / landscape.length**2)
+    newton = local_model.newton(_SOFT * landscape.stiffness / landscape.length**2)
     evaluation = at.evaluation
     for _ in range(_STIFF_STEPS):
         newton.prepare()

@@ -18,7 +18,7 @@ from jamshape.packing.columns import as_columns, kept
 from jamshape.packing.given import as_floats, as_integers
 from jamshape.packing.rotation import UNIT_QUATERNION_TOLERANCE, across, body_axes
 from jamshape.records import Record
-from jamshape.shapes.shape import Interaction, Shape
+from jamshape.shapes.shape import Interaction, Shape, stiffness_of
 from jamshape.shapes.table import DEFAULT, shape_named
 
 # Fields reset when one of these is replaced.
@@ -90,7 +90,7 @@ class Packing(Record):
             object.__setattr__(self, name, as_integers(name, getattr(self, name), shape))
         _check_labels(self)
         _check_shapes(self)
-        object.__setattr__(self, "law", _checked_law(self.law))
+        object.__setattr__(self, "law", _checked_law(self.law, self.species))
         object.__setattr__(self, "columns", as_columns(self.columns, n))
         if self.file is not None:  # so that it stays valid when the working folder changes
             object.__setattr__(self, "file", self.file.absolute())
@@ -113,7 +113,7 @@ class Packing(Record):
     def compiled(self, law: Interaction | None = None) -> Any:
         """Make the compiled object that evaluates contacts of these particles; under their own law by default."""
         sizes = (self.diameters, self.exponent)
-        return self.shape.compiled(sizes, self.dimension, law or self.law)
+        return self.shape.compiled(sizes, self.dimension, law or self.law, self.species)
 
     @cached_property
     def _bodies(self) -> Any:
@@ -298,12 +298,12 @@ def _check_labels(packing: Packing) -> None:
         raise ValueError(msg)
 
 
-def _checked_law(law: Interaction) -> Interaction:
-    """Return the constants of the contacts, or raise a ValueError."""
+def _checked_law(law: Interaction, species: IntArray) -> Interaction:
+    """Return the constants of the contacts of particles of some species, or raise a ValueError."""
     try:
-        k_e, sides = float(law[0]), int(law[1])
+        k_e, sides = stiffness_of(law[0]), int(law[1])
         is_law = (
-            0 < k_e < np.inf
+            (isinstance(k_e, tuple) or 0 < k_e < np.inf)
             and sides in {1, 2}
             and sides == law[1]
             and len(law) == len(Interaction._fields)
@@ -312,7 +312,14 @@ def _checked_law(law: Interaction) -> Interaction:
         is_law = False
     if not is_law:
         msg = (
-            f"law is {law!r}, expected Interaction(k_e, sides) with a positive k_e and sides 1 or 2"
+            f"law is {law!r}, expected Interaction(k_e, sides) with a positive k_e, or a symmetric table of them by"
+            " species, and sides 1 or 2"
+        )
+        raise ValueError(msg)
+    if isinstance(k_e, tuple) and len(k_e) < species.max():
+        msg = (
+            f"k_e of the law has {len(k_e)} rows and columns, expected one for each species up to {species.max()}, the"
+            " largest of the packing"
         )
         raise ValueError(msg)
     return Interaction(k_e, sides)

@@ -17,7 +17,6 @@ from jamshape.minima import Stop, minimise
 from jamshape.packing import Packing, State
 from jamshape.protocols.stages import Making
 from jamshape.recording.driver import Told
-from jamshape.shapes.shape import Interaction
 
 # Residual to which a frame is minimised to decide whether it is jammed.
 _GOOD = 1e-4
@@ -25,7 +24,8 @@ _GOOD = 1e-4
 
 def frame_of(file: Path, frame: int) -> Packing:
     """Read a frame under the law of minima: two bonds side to side, whatever the dynamics had."""
-    return read_packing(file, frame).with_(law=Interaction())
+    found = read_packing(file, frame)
+    return found.with_(law=found.law.but(sides=2))
 
 
 class Choosing:

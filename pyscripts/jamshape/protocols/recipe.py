@@ -20,7 +20,6 @@ from jamshape.protocols.approach import Approach
 from jamshape.protocols.quasistatic import Quasistatic
 from jamshape.protocols.random_start import dilute_packing, random_packing
 from jamshape.shapes.particles import Particles
-from jamshape.shapes.shape import Interaction
 
 SEARCHES = {"extrapolation": extrapolation, "bisection": bisection}
 """Searches for a target energy: ours, and that of Marschall & Teitel 2018, Sec. III C, as written."""
@@ -212,7 +211,8 @@ class Compressed:
     def start(self, recipe: Recipe) -> Packing:
         """Make the random start, without overlaps, or take the first frame of the file."""
         if self.source is not None:
-            return read_packing(self.source, 0).with_(law=Interaction())
+            first = read_packing(self.source, 0)
+            return first.with_(law=first.law.but(sides=2))
         return random_packing(
             recipe.n, recipe.phi_start, recipe.seed, recipe.particles, recipe.dimension
         )

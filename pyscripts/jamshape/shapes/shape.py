@@ -9,11 +9,13 @@ from __future__ import annotations
 import importlib
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from jamshape.checks import Range
+from jamshape.arrays import real_numbers
+from jamshape.checks import Range, said
 
 if TYPE_CHECKING:
     from jamshape.arrays import FloatArray, IntArray
@@ -60,13 +62,75 @@ class Style(NamedTuple):
     """`pair_style` and `pair_coeff`, one a line."""
 
 
+Stiffness: TypeAlias = float | tuple[tuple[float, ...], ...]
+"""k_e of all contacts, or a symmetric (T, T) table by the species of the two particles, [energy]."""
+
+
+def stiffness_of(k_e: ArrayLike) -> Stiffness:
+    """Return k_e as a float, or as a table of tuples.
+
+    Raises
+    ------
+    ValueError
+        If it is neither a number nor a symmetric table of positive ones.
+
+    Examples
+    --------
+    >>> stiffness_of([[1, 2], [2, 4]])
+    ((1.0, 2.0), (2.0, 4.0))
+    """
+    try:
+        found = real_numbers("k_e", k_e).astype(np.float64)
+    except ValueError:  # another type
+        found = np.empty(0)
+    if found.ndim == 0:
+        return float(found)
+    is_square = found.ndim == 2 and found.size > 0 and found.shape[0] == found.shape[1]
+    if not (is_square and (found == found.T).all() and ((found > 0) & (found < np.inf)).all()):
+        msg = (
+            f"k_e is {said(k_e)}, expected a positive number, or a symmetric table of them with a row and a column for"
+            " each species"
+        )
+        raise ValueError(msg)
+    return tuple(map(tuple, found.tolist()))
+
+
+def stiffness_text(k_e: Stiffness) -> str:
+    """Format k_e as one word, of which `stiffness_told` makes it again.
+
+    Examples
+    --------
+    >>> stiffness_text(2.0), stiffness_text(((1.0, 2.0), (2.0, 4.0)))
+    ('2.0', '1.0,2.0;2.0,4.0')
+    """
+    if isinstance(k_e, tuple):
+        return ";".join(",".join(map(repr, row)) for row in k_e)
+    return repr(float(k_e))
+
+
+def stiffness_told(text: str) -> Stiffness:
+    """Read k_e from `stiffness_text`; raises ValueError if it is none."""
+    rows = [[float(word) for word in row.split(",")] for row in text.split(";")]
+    return stiffness_of(rows if "," in text or ";" in text else rows[0][0])
+
+
+def pair_coefficients(k_e: Stiffness, species: IntArray) -> list[str]:
+    """Return the `pair_coeff` commands of k_e, for LAMMPS types of some (n_types,) species."""
+    if not isinstance(k_e, tuple):
+        return [f"pair_coeff * * {k_e!r}"]
+    table = [[k_e[a - 1][b - 1] for b in species.tolist()] for a in species.tolist()]
+    types = range(len(table))
+    return [f"pair_coeff {i + 1} {j + 1} {table[i][j]!r}" for i in types for j in types[i:]]
+
+
 class Interaction(NamedTuple):
     """Constants of the contacts: beside the particles, all that energy and forces of a packing depend on.
 
     Parameters
     ----------
-    k_e : float, [energy]
-        Stiffness of a contact.
+    k_e : float or (T, T) array_like, [energy]
+        Stiffness of a contact: one number, or a symmetric table by the species of the two particles, from 1 to T, as
+        LAMMPS has it by type in ``pair_coeff I J k_e``. A packing keeps a table as a tuple of tuples.
     sides : {1, 2}
         Bonds of a side-to-side contact, for shapes that have both laws.
 
@@ -80,9 +144,15 @@ class Interaction(NamedTuple):
     >>> stiff = discs.with_(law=js.Interaction(k_e=2.0))
     >>> round(float(stiff.u / discs.u), 12)
     2.0
+
+    Contacts of two species, and between them:
+
+    >>> mixed = discs.with_(species=[1, 2], law=js.Interaction(k_e=[[1, 3], [3, 2]]))
+    >>> round(float(mixed.u / discs.u), 12)
+    3.0
     """
 
-    k_e: float = 1.0
+    k_e: Stiffness = 1.0
     """[energy]"""
     sides: int = 2
     """Bonds of a side-to-side contact, 1 or 2, for shapes that have both laws."""
@@ -92,11 +162,12 @@ class Interaction(NamedTuple):
         """Read the constants from a mapping by name; defaults where missing."""
         usual = cls()
         k_e, sides = (known.get(name, getattr(usual, name)) for name in cls._fields)
-        return cls(float(k_e), int(sides))
+        return cls(stiffness_of(k_e), int(sides))
 
-    def but(self, k_e: float | None = None, sides: int | None = None) -> Interaction:
+    def but(self, k_e: ArrayLike | None = None, sides: int | None = None) -> Interaction:
         """Replace the constants that are not None."""
-        return Interaction(self.k_e if k_e is None else k_e, self.sides if sides is None else sides)
+        stiffness = self.k_e if k_e is None else stiffness_of(k_e)
+        return Interaction(stiffness, self.sides if sides is None else sides)
 
 
 class Shape(ABC):
@@ -128,7 +199,11 @@ class Shape(ABC):
         return f"{self.name.capitalize()}s"
 
     def compiled(
-        self, particles: tuple[FloatArray, FloatArray], dimension: int, law: Interaction
+        self,
+        particles: tuple[FloatArray, FloatArray],
+        dimension: int,
+        law: Interaction,
+        species: IntArray | None = None,
     ) -> Any:
         """Make the object of `jamshape._contact` that evaluates contacts of some particles.
 
@@ -138,15 +213,21 @@ class Shape(ABC):
             Diameters, [length], and exponents.
         dimension : {2, 3}
         law : Interaction
+        species : (N,) array of int64, optional
+            From 1; needed if the law has a table of k_e.
 
         Raises
         ------
         ValueError
-            If a particle does not have this shape.
+            If a particle does not have this shape, or the table has no row of its species.
         """
         # Imported here so that files can be read and written without the compiled module.
         contact = importlib.import_module("jamshape._contact")
-        return getattr(contact, self.compiled_name)(*particles, dimension, law.k_e, law.sides)
+        make = getattr(contact, self.compiled_name)
+        if np.ndim(law.k_e):
+            table = np.array(law.k_e, np.float64)
+            return make(*particles, dimension, table, species, law.sides)
+        return make(*particles, dimension, law.k_e, law.sides)
 
     @abstractmethod
     def fits(self, diameters: FloatArray) -> bool:
@@ -193,8 +274,12 @@ class Shape(ABC):
 
     def style(self, packing: Any, law: Interaction) -> Style:
         """Return the LAMMPS commands for a packing of this shape."""
-        command = f"pair_style {self.name}/harmonic\npair_coeff * * {law.k_e!r}"
-        return Style(packing.species, command)
+        return Style(packing.species, self.styled(packing, law, f"{self.name}/harmonic"))
+
+    def styled(self, packing: Any, law: Interaction, style: str) -> str:
+        """Return `pair_style` and `pair_coeff` of a packing whose LAMMPS types are its species."""
+        kinds = np.arange(1, packing.species.max() + 1)
+        return "\n".join([f"pair_style {style}", *pair_coefficients(law.k_e, kinds)])
 
     def described(self, diameters: FloatArray, exponent: FloatArray) -> dict[str, float]:
         """Return descriptors of the first of (N, 3) diameters and (N,) exponents."""

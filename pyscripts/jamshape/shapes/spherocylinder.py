@@ -28,8 +28,8 @@ class Spherocylinder(ElongatedShape):
     def style(self, packing: Any, law: Interaction) -> Style:
         """See `Shape.style`; `sides` is the number of bonds of a side-to-side contact."""
         sides = ("one", "two")[law.sides - 1]
-        command = f"pair_style {self.name}/harmonic sides {sides}\npair_coeff * * {law.k_e!r}"
-        return Style(packing.species, command)
+        style = f"{self.name}/harmonic sides {sides}"
+        return Style(packing.species, self.styled(packing, law, style))
 
     def stem(self, parameters: Mapping[str, float]) -> str:
         """See `Shape.stem`."""

@@ -14,7 +14,14 @@ from jamshape.arrays import FloatArray
 from jamshape.checks import Range
 from jamshape.shapes.mesh import SurfaceMesh, arc
 from jamshape.shapes.roundness import asphericity, axes_from, reduced_aspect_ratio
-from jamshape.shapes.shape import Interaction, Parameter, Shape, Style, in_name
+from jamshape.shapes.shape import (
+    Interaction,
+    Parameter,
+    Shape,
+    Style,
+    in_name,
+    pair_coefficients,
+)
 from jamshape.shapes.solid import Superquadric
 from jamshape.shapes.superellipsoid_surface import surface_mesh
 
@@ -70,13 +77,19 @@ class Superellipsoid(Shape):
     def style(self, packing: Any, law: Interaction) -> Style:
         """See `Shape.style`; exponents are per type in LAMMPS."""
         types = packing.species
+        kinds = np.arange(1, types.max() + 1)
         exponents = {int(k): packing.exponent[types == k] for k in np.unique(types)}
         if any((own != own[0]).any() for own in exponents.values()):
-            # A species may hold several exponents: each exponent gets a type.
-            types = 1 + np.unique(packing.exponent, return_inverse=True)[1].astype(np.int64)
+            # A species may hold several exponents: each exponent of a species gets a type.
+            both = np.column_stack([packing.exponent, packing.species])
+            rows, numbers = np.unique(both, axis=0, return_inverse=True)
+            types, kinds = 1 + numbers.reshape(-1).astype(np.int64), rows[:, 1].astype(np.int64)
             exponents = {int(k): packing.exponent[types == k] for k in np.unique(types)}
-        lines = [f"pair_style {self.name}/harmonic", f"pair_coeff * * {law.k_e!r}"]
-        lines += [f"pair_coeff {k} {k} {law.k_e!r} {float(p[0])!r}" for k, p in exponents.items()]
+        lines = [f"pair_style {self.name}/harmonic", *pair_coefficients(law.k_e, kinds)]
+        for k, p in exponents.items():
+            row = kinds[k - 1] - 1
+            own = law.k_e[row][row] if isinstance(law.k_e, tuple) else law.k_e
+            lines.append(f"pair_coeff {k} {k} {own!r} {float(p[0])!r}")
         return Style(types, "\n".join(lines))
 
     def described(self, diameters: FloatArray, exponent: FloatArray) -> dict[str, float]:

@@ -14,7 +14,7 @@ from jamshape.packing import State
 PAGE = Path(__file__).parents[3] / "docs/how-to/your-own-states.md"
 YES, ROUNDED, NO = "yes", "to rounding", "no"
 GRADES = [YES, ROUNDED, NO]
-LAW = js.Interaction(2.5, 1)
+K_E = 1.0 + np.add.outer(np.arange(9), np.arange(9)) / 3  # of each pair of types
 
 
 def living(packing, folder):
@@ -78,7 +78,7 @@ def rotations(packing):
 KEPT = {
     "shape": exact(lambda p: p.shape_style),
     "dimension": exact(lambda p: p.dimension),
-    "`k_e`": exact(lambda p: p.law.k_e),
+    "`k_e`, also of each pair of types": exact(lambda p: p.law.k_e),
     "`sides` of rods": lambda a, b: NO if b.shape_style == "spherocylinder" and a.law != b.law else YES,
     "sizes": exact(lambda p: p.diameters),
     "exponents": exact(lambda p: p.exponent),
@@ -99,7 +99,9 @@ def whole(name, dimension, make):
     packing = make(name, dimension).sorted_by_id()
     rest = 1e-18 * np.ones((packing.n, dimension))
     columns = {"c_e": np.arange(packing.n) / 3, "element": np.array(["a"] * packing.n)}
-    return packing.with_(law=LAW, position_rest=rest, columns=columns)
+    n_types = packing.species.max()
+    law = js.Interaction(K_E[:n_types, :n_types], 1)
+    return packing.with_(law=law, position_rest=rest, columns=columns)
 
 
 @pytest.fixture(scope="module")

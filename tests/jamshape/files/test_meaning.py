@@ -113,7 +113,16 @@ def test_the_pair_style_of_a_file_says_shape_law_and_exponents(path):
     np.testing.assert_array_equal(packing.exponent, 1.5)
     two = "Pair Coeffs # dimer/harmonic\n\n1 1\n2 3\n\nAtoms"
     path.write_text(changed(("Atoms", two), ("1 atom types", "2 atom types")))
-    with pytest.raises(FileFormatError, match=r"stiffnesses k_e \[1.0, 3.0\], expected a single"):
+    with pytest.warns(UserWarning, match="k_e of equal types only.*write_data FILE pair ij"):
+        packing = js.load(path)
+    assert packing.law.k_e == ((1.0, 3**0.5), (3**0.5, 3.0))  # as LAMMPS mixes
+    three = "PairIJ Coeffs # dimer/harmonic\n\n1 1 1\n1 2 7\n2 2 3\n\nAtoms"
+    path.write_text(changed(("Atoms", three), ("1 atom types", "2 atom types")))
+    assert js.load(path).law.k_e == ((1.0, 7.0), (7.0, 3.0))
+    path.write_text(
+        changed(("Atoms", three.replace("1 2 7\n", "")), ("1 atom types", "2 atom types"))
+    )
+    with pytest.raises(FileFormatError, match="coefficients have 2 rows for 2 types, expected 3"):
         js.load(path)
 
 
