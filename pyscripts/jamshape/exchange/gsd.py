@@ -26,6 +26,7 @@ from jamshape.exchange.tools import tool
 from jamshape.files.disk import PathLike, replacing
 from jamshape.files.frames import Form, row_of
 from jamshape.files.hdf5 import FileFormatError
+from jamshape.files.vocabulary import FORMAT_VERSION, require_format
 from jamshape.packing import Packing
 from jamshape.shapes.mesh import SurfaceMesh
 from jamshape.shapes.shape import Interaction
@@ -156,6 +157,7 @@ def _frame(hoomd: Any, packing: Packing, form: Form) -> Any:
     of_box = box_fields(packing, rests=form.rests, tilted=form.tilted)
     exact |= {_LOG + name: x for name, x in of_box.items()}
     exact[_LOG + "time"] = np.array([packing.time])
+    exact[_LOG + "format_version"] = np.array([FORMAT_VERSION])
     exact[_LOG + "law"] = np.array(packing.law, np.float64)
     # As numbers: OVITO before 3.17 fails on texts.
     exact[_LOG + "shape_style"] = np.frombuffer(packing.shape_style.encode(), np.uint8)
@@ -235,16 +237,18 @@ def _packing(path: PathLike, hoomd: Any, frame: Any) -> Packing:
     }
     try:
         style, time = bytes(found.pop("shape_style")).decode(), float(found.pop("time")[0])
+        require_format(path, int(found.pop("format_version", [2])[0]), "0.1.0")
         columns = [name for name in found if name.startswith(_COLUMNS)]
         found["columns"] = {name.removeprefix(_COLUMNS): found.pop(name) for name in columns}
-        if "law" in found:  # missing in files of 0.1.0
-            k_e, sides = found["law"].tolist()
-            found["law"] = Interaction(k_e, sides)
+        k_e, sides = found["law"].tolist()
+        found["law"] = Interaction(k_e, sides)
         packing = packing_of(found, style, int(frame.configuration.step), time)
         return as_edited(packing, _frame(hoomd, packing, Form.of(packing)), frame)
     except (KeyError, TypeError) as error:
         msg = f"{path}: holds no log/jamshape of a packing, expected a file of write_gsd"
         raise FileFormatError(msg) from error
+    except FileFormatError:
+        raise
     except ValueError as error:
         msg = f"{path}: {error}"
         raise FileFormatError(msg) from error
