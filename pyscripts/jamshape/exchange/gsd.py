@@ -33,7 +33,10 @@ from jamshape.shapes.shape import Interaction
 from jamshape.shapes.solid import Balls, Solid, Superquadric
 from jamshape.shapes.table import shape_named
 
-_LOG, _PARTICLES = "jamshape/", "particles/jamshape/"
+LOG = "jamshape/"
+"""Prefix of the data of a packing in the log of a frame."""
+
+_PARTICLES = "particles/jamshape/"
 _COLUMNS = "columns/"
 
 _FINE, _COARSE = 3, 1  # levels of meshes, so that files stay small
@@ -112,14 +115,14 @@ def read_gsd(path: PathLike, frame: int = -1) -> Packing:
         If the file cannot be opened.
     """
     hoomd = tool("gsd.hoomd", "gsd")
-    with _opened(hoomd, path) as file:
+    with opened_gsd(hoomd, path) as file:
         return _packing(path, hoomd, file[row_of(frame, len(file), path)])
 
 
 def read_gsd_clock(path: PathLike) -> tuple[IntArray, FloatArray]:
     """Read steps (T,) and times (T,) of the frames; errors as `read_gsd`."""
-    with _opened(tool("gsd.hoomd", "gsd"), path) as file:
-        chunks = (("configuration/step", 0), (f"log/{_LOG}time", 0.0))
+    with opened_gsd(tool("gsd.hoomd", "gsd"), path) as file:
+        chunks = (("configuration/step", 0), (f"log/{LOG}time", 0.0))
         step, time = (
             [file.file.read_chunk(k, name)[0] if file.file.chunk_exists(k, name) else otherwise
              for k in range(len(file))]
@@ -128,7 +131,8 @@ def read_gsd_clock(path: PathLike) -> tuple[IntArray, FloatArray]:
         return np.array(step, np.int64), np.array(time, np.float64)
 
 
-def _opened(hoomd: Any, path: PathLike) -> Any:
+def opened_gsd(hoomd: Any, path: PathLike) -> Any:
+    """Open a GSD file for reading, or refuse it."""
     try:
         return hoomd.open(str(path), "r")
     except RuntimeError as error:
@@ -155,12 +159,12 @@ def _frame(hoomd: Any, packing: Packing, form: Form) -> Any:
     exact = {_PARTICLES + name: x for name, x in particle_fields(packing, rests=form.rests).items()}
     exact |= {f"{_PARTICLES}{_COLUMNS}{name}": x for name, x in packing.columns.items()}
     of_box = box_fields(packing, rests=form.rests, tilted=form.tilted)
-    exact |= {_LOG + name: x for name, x in of_box.items()}
-    exact[_LOG + "time"] = np.array([packing.time])
-    exact[_LOG + "format_version"] = np.array([FORMAT_VERSION])
-    exact[_LOG + "law"] = np.array(packing.law, np.float64)
+    exact |= {LOG + name: x for name, x in of_box.items()}
+    exact[LOG + "time"] = np.array([packing.time])
+    exact[LOG + "format_version"] = np.array([FORMAT_VERSION])
+    exact[LOG + "law"] = np.array(packing.law, np.float64)
     # As numbers: OVITO before 3.17 fails on texts.
-    exact[_LOG + "shape_style"] = np.frombuffer(packing.shape_style.encode(), np.uint8)
+    exact[LOG + "shape_style"] = np.frombuffer(packing.shape_style.encode(), np.uint8)
     frame.log = exact
     return frame
 
@@ -228,7 +232,7 @@ def _mesh(surface: SurfaceMesh) -> dict[str, Any]:
 
 def _packing(path: PathLike, hoomd: Any, frame: Any) -> Packing:
     logged: Mapping[str, Any] = frame.log
-    prefixes = (_LOG, _PARTICLES)
+    prefixes = (LOG, _PARTICLES)
     found = {
         name.removeprefix(prefix): value
         for name, value in logged.items()

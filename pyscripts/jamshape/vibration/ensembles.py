@@ -11,7 +11,8 @@ from jamshape.vibration.table import ModeTable
 
 TOLD = ("low", "middle", "high")  # bands
 
-_PREFIX = "packing_"  # of attributes copied from the packing's file
+PREFIX = "packing_"
+"""Of the attributes that modes copy from the file of their packing."""
 
 
 class Key(NamedTuple):
@@ -32,13 +33,13 @@ class Key(NamedTuple):
 def of_packing(table: ModeTable) -> dict[str, Any]:
     """Return the attributes of the packing's file."""
     known = table.attributes.items()
-    return {name.removeprefix(_PREFIX): v for name, v in known if name.startswith(_PREFIX)}
+    return {name.removeprefix(PREFIX): v for name, v in known if name.startswith(PREFIX)}
 
 
 def to_store(attributes: Mapping[str, Any], packing: Packing) -> dict[str, Any]:
     """Return the attributes that a file of modes copies from its packing: those of its file, shape and law."""
     known = dict(attributes) | {"shape": packing.shape_style, **packing.law._asdict()}
-    return {f"{_PREFIX}{name}": value for name, value in known.items()}
+    return {f"{PREFIX}{name}": value for name, value in known.items()}
 
 
 def key_of(table: ModeTable) -> Key:

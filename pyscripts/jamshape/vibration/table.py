@@ -38,14 +38,17 @@ BANDS = {-1: "translation", 0: "low", 1: "middle", 2: "high", 3: "none"}
 _TRANSLATION, _HIGH, _NONE = -1, 2, 3
 
 MODULI = ("bulk", "pure_shear", "simple_shear")
-_COUNTS = ("n_floppy_left_out", "n_unsettled_left_out", "n_negative_modes")
-_PARTS = ("affine", "rounding", "of_state")
+COUNTS = ("n_floppy_left_out", "n_unsettled_left_out", "n_negative_modes")
+"""Attributes with the counts of `Moduli`."""
 
-# Contributions to the error bound of each eigenvalue.
-_ERRORS = ("solver_error", "entry_error", "overlap_error")
+PARTS = ("affine", "rounding", "of_state")
+"""Ends of the names of attributes with parts of a `Modulus`."""
+
+ERRORS = ("solver_error", "entry_error", "overlap_error")
+"""Columns that contribute to the error bound of each eigenvalue."""
 
 _COLUMNS = (
-    *("eigenvalues", "omega", "sign", *_ERRORS, "state_error", "is_translation"),
+    *("eigenvalues", "omega", "sign", *ERRORS, "state_error", "is_translation"),
     *("participation", "parallel", "perpendicular", "rotation", "of_round", "band"),
 )
 
@@ -84,7 +87,7 @@ class ModeTable:
     @property
     def bound(self) -> FloatArray:
         """(k,) bound of the error of each eigenvalue of this state."""
-        return np.asarray(np.sum([self[name] for name in _ERRORS], axis=0))
+        return np.asarray(np.sum([self[name] for name in ERRORS], axis=0))
 
     def in_band(self, name: str) -> IntArray:
         """Rows of the modes of one band."""
@@ -119,7 +122,7 @@ class ModeTable:
         """Elastic moduli."""
         a = self.attributes
         bulk, pure_shear, simple_shear = (_stored_modulus(a, f"{name}_modulus") for name in MODULI)
-        counts = (int(a[name]) for name in _COUNTS)
+        counts = (int(a[name]) for name in COUNTS)
         return Moduli(bulk, pure_shear, simple_shear, a["pressure"], *counts)
 
 
@@ -197,18 +200,18 @@ def _to_store(elastic: Moduli) -> dict[str, Any]:
     """Spread moduli over attributes."""
     found: dict[str, Any] = {"pressure": elastic.pressure}
     counts = (elastic.n_floppy, elastic.n_unsettled, elastic.n_negative)
-    found |= dict(zip(_COUNTS, counts, strict=True))
+    found |= dict(zip(COUNTS, counts, strict=True))
     for name in MODULI:
         modulus: Modulus = getattr(elastic, name)
         key = f"{name}_modulus"
         found |= {key: modulus.relaxed, f"{key}_bound": modulus.bound}
-        found |= {f"{key}_{part}": getattr(modulus, part) for part in _PARTS}
+        found |= {f"{key}_{part}": getattr(modulus, part) for part in PARTS}
         found |= {f"{key}_reason": modulus.reason} if modulus.reason else {}
     return found
 
 
 def _stored_modulus(attributes: Mapping[str, Any], key: str) -> Modulus:
-    affine, rounding, of_state = (float(attributes[f"{key}_{p}"]) for p in _PARTS)
+    affine, rounding, of_state = (float(attributes[f"{key}_{p}"]) for p in PARTS)
     reason = str(attributes.get(f"{key}_reason", ""))
     return Modulus(float(attributes[key]), affine, rounding, of_state, reason)
 
