@@ -109,15 +109,6 @@ def test_ways_to_jamming_are_told_apart(tmp_path):
     assert system_labels([first, second])[second].endswith(", quasistatic")
 
 
-def test_files_of_earlier_versions_have_todays_names(tmp_path):
-    particles = superellipsoids(1.5)
-    packing = random_packing(8, 0.1, 1, particles, 3)
-    old = {"p": 1.5, "w1": 1.0, "w2": 1.0, "n": 8, "seed": 1, "outcome": "converged"}
-    write_packing(tmp_path / "old.h5", packing, old | {"protocol": 1, "pressure": 1e-6})
-    (system,) = read_groups([tmp_path / "old.h5"])
-    assert system.number("exponent") == 1.5
-
-
 def test_a_mixture_is_named_by_its_kinds(tmp_path):
     packing = random_packing(8, 0.1, 1, bidisperse(1))
     known = {"kinds": "alpha=4,size=1; alpha=0,size=2", "n": 8, "seed": 1, "outcome": "converged"}

@@ -3,9 +3,10 @@
     jamshape convert packing.h5 run.h5
     jamshape convert old/*.h5 --out new
 
-FILE is a packing, a run, modes or a GSD file. It is replaced when its conversion is complete, or with --out copied to a
-folder. All numbers stay the same to the bit, and files of the present format as they are. A run that was interrupted
-keeps its rows and frames, but cannot be resumed. The last line of standard output is one JSON object.
+FILE is a packing, a run, modes or a GSD file. It is replaced when its conversion is complete; with --out, copies are
+written to a folder. Numbers stay the same to the bit, except that translations among modes become exact zeros. Files
+of the present format stay as they are. A run that was interrupted keeps its rows and frames, but cannot be resumed. The
+last line of standard output is one JSON object.
 """
 
 from __future__ import annotations
@@ -75,4 +76,6 @@ def _told(path: Path, found: Converted | None) -> str:
         return said
     journal = path.with_name(f"{path.name}.journal")
     left = f", without the rows in {journal}" if journal.exists() else ""
-    return f"{said}{left}; it is not finished and cannot be resumed, repeat its command with --again"
+    return (
+        f"{said}{left}; it is not finished and cannot be resumed, repeat its command with --again"
+    )

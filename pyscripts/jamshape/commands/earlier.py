@@ -24,13 +24,22 @@ from jamshape.files.signature import GSD, HDF5, format_of
 from jamshape.files.vocabulary import FORMAT_VERSION, protocol_named, require_format
 from jamshape.front.recorded import KINDS
 from jamshape.old_names import VALUES
+from jamshape.packing import Packing
 from jamshape.protocols.approach import FOR_A_PACKING
 from jamshape.protocols.make import MAKING
 from jamshape.recording.driver import KIND
 from jamshape.shapes.shape import Interaction
 from jamshape.shapes.table import SHAPES
 from jamshape.vibration.ensembles import PREFIX
-from jamshape.vibration.table import COUNTS, ERRORS, MODULI, PARTS, holds_modes, table_of, write_modes
+from jamshape.vibration.table import (
+    COUNTS,
+    ERRORS,
+    MODULI,
+    PARTS,
+    holds_modes,
+    table_of,
+    write_modes,
+)
 
 if TYPE_CHECKING:
     import h5py
@@ -141,22 +150,23 @@ def _particles(path: Path, out: Path) -> Converted | None:
             return None
         content = Content.of(out, file)
         has_law = "k_e" in hdf5.require_item(file, "particles/all").attrs
-    known = _of_today(content.attributes)
     if not has_law:
-        law = Interaction.told(known)
+        law = Interaction.told(content.attributes)
         content.frames = [frame.with_(law=law) for frame in content.frames]
-    content.attributes, content.columns = known, renamed(content.columns)
+    content.attributes = _of_today(content.attributes, content.frames[0])
+    content.columns = renamed(content.columns)
     with hdf5.written(out) as file:
         content.fill(file)
         attributes = file["h5md/creator"].attrs
         del attributes["origin"]  # bits are those of the machine that computed them
         if "origin" in creator:
             attributes["origin"] = np.bytes_(creator["origin"])
-    return Converted(known.get(KIND, "packing"), version, known.get("finished", True))
+    known = content.attributes
+    return Converted(known.get(KIND, "packing"), version, bool(known.get("finished", True)))
 
 
-def _of_today(attributes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the attributes of a packing or a run under today's names, with its kind."""
+def _of_today(attributes: Mapping[str, Any], first: Packing) -> dict[str, Any]:
+    """Return the attributes of a packing or a run under today's names, with what all runs state."""
     known = renamed(attributes)
     if {"phi_unjams", "phi_jams", "frames_minimised"} <= known.keys():
         known = {"frames_undecided": 0} | known
@@ -165,7 +175,8 @@ def _of_today(attributes: Mapping[str, Any]) -> dict[str, Any]:
         return known
     if kind == "slow compression" and "gdot" in known:
         kind = "slow shear"
-    return {"finished": False} | known | {KIND: kind}
+    usual = {"finished": False, "dimension": first.dimension, **first.law._asdict()}
+    return usual | known | {KIND: kind}
 
 
 # --- modes ---------------------------------------------------------------------------------------

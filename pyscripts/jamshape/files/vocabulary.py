@@ -49,8 +49,8 @@ def require_format(path: PathLike, version: int, creator: str) -> None:
     """
     if version == FORMAT_VERSION:
         return
-    advice = f"run jamshape convert {path}" if version < FORMAT_VERSION else "read it with that version"
-    msg = (
-        f"{path} was written by jamshape {creator} (format {version}), expected format {FORMAT_VERSION}; {advice}"
+    advice = (
+        f"run jamshape convert {path}" if version < FORMAT_VERSION else "read it with that version"
     )
+    msg = f"{path} was written by jamshape {creator} (format {version}), expected format {FORMAT_VERSION}; {advice}"
     raise FileFormatError(msg)
