@@ -45,13 +45,13 @@ def table(dimension=2, **packing):
         N,
         dimension,
     )
-    known = {"seed": 1, "n": N} | packing
+    known = {"seed": 1, "n": N, "shape": "spherocylinder"} | packing
     attributes = {f"packing_{name}": value for name, value in known.items()}
     return ModeTable(columns, np.empty((size, 0)), coordinates, np.empty(0), attributes)
 
 
 def test_system_and_energy_of_modes():
-    rods = key_of(table(alpha=4.0, u0=1e-15, shape="spherocylinder"))
+    rods = key_of(table(alpha=4.0, u0=1e-15))
     assert (rods.system.shape, rods.system.dimension) == ("spherocylinder", 2)
     assert (rods.number("alpha"), rods.number("u0")) == (4.0, 1e-15)
     known = {"exponent": 1.5, "w1": 1.0, "w2": 1.0, "protocol": "yuan-2019-1"}
@@ -61,7 +61,7 @@ def test_system_and_energy_of_modes():
     assert key_of(table(alpha=1.0, shape="superellipsoid")).system.parameters == ()
     assert seed_of(table(seed=7)) == 7
     with pytest.raises(ValueError, match="do not state the shape"):
-        key_of(table(alpha=4.0, u0=1.0))
+        key_of(table(alpha=4.0, shape=None))
 
 
 def test_files_are_grouped_and_selected(tmp_path):

@@ -190,7 +190,7 @@ def _modes(path: Path, out: Path) -> Converted | None:
             return None
         _complete(file)
         table, vectors = table_of(file), hdf5.has_item(file, "modes/vectors")
-    known = _of_modes(table.attributes, table.coordinates.dimension)
+    known = _of_modes(table.attributes)
     known.setdefault("n_translations", int(table["is_translation"].sum()))
     write_modes(out, dataclasses.replace(table, attributes=known), {}, vectors=vectors)
     return Converted("modes", version)
@@ -206,7 +206,7 @@ def _complete(file: h5py.File) -> None:
         column[...] = np.where(is_translation, 0.0, column[()])
 
 
-def _of_modes(attributes: Mapping[str, Any], dimension: int) -> dict[str, Any]:
+def _of_modes(attributes: Mapping[str, Any]) -> dict[str, Any]:
     """Return the attributes of modes under today's names; unknown bounds of moduli are infinite."""
     own = {name: value for name, value in attributes.items() if not name.startswith(PREFIX)}
     packing = renamed(

@@ -131,7 +131,7 @@ def test_after_ctrl_c_it_is_told_how_to_go_on(jamshape, tmp_path):
     sentence = "jamshape compress: interrupted; the same command resumes from the last checkpoint"
     assert complaint.strip().splitlines()[-1] == sentence
     told = jamshape("info", out)
-    assert "run, not finished" in told.out
+    assert "compression, not finished" in told.out
     assert told.report["go_on"] == "repeat the command that began it"
     resumed = jamshape("compress", *options, "--out", out)
     assert resumed.report["phi"] == pytest.approx(0.86, abs=1e-3)
