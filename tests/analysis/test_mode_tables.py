@@ -60,8 +60,10 @@ def test_system_and_energy_of_modes():
     assert (bodies.u0, bodies.system.protocol) == (0.0, "yuan-2019-1")
     assert key_of(table(alpha=1.0, shape="superellipsoid")).system.parameters == ()
     assert seed_of(table(seed=7)) == 7
+    shapeless = table(alpha=4.0)
+    del shapeless.attributes["packing_shape"]
     with pytest.raises(ValueError, match="do not state the shape"):
-        key_of(table(alpha=4.0, shape=None))
+        key_of(shapeless)
 
 
 def test_files_are_grouped_and_selected(tmp_path):

@@ -51,7 +51,7 @@ def key_of(table: ModeTable) -> Key:
         If the modes do not state the shape of their packing.
     """
     known = of_packing(table)
-    if not known.get("shape"):
+    if "shape" not in known:
         msg = "modes do not state the shape of their packing, expected modes of a packing of make_packing.py"
         raise ValueError(msg)
     u0 = float(known.get("u0", 0.0))
