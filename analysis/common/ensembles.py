@@ -17,7 +17,6 @@ import numpy as np
 
 from jamshape.files.ensembles import PackingFile, System
 from jamshape.files.h5md import FileFormatError
-from jamshape.files.vocabulary import renamed
 from jamshape.shapes.table import DEFAULT
 
 # Suffixes of other files that may lie beside a packing.
@@ -123,7 +122,7 @@ def read_table(path: Path) -> list[PackingFile]:
         if missing := [name for name in (*_STYLE, "file", "outcome") if not line.get(name)]:
             msg = f"{path}, line {number_of}: has no {missing[0]}, expected a table of sample_tables.py"
             raise ValueError(msg)
-        known = renamed({name: _read(text) for name, text in line.items() if text})
+        known = {name: _read(text) for name, text in line.items() if text}
         shape, dimension = (known.pop(name) for name in _STYLE)
         found.append(PackingFile(path.parent / known.pop("file"), known, (shape, int(dimension))))
     return found

@@ -74,17 +74,6 @@ def renamed_class(old: str, new: type) -> type:
     return new
 
 
-def stored(name: str, value: Any) -> Any:
-    """Return today's value for an old one in a file, without a warning; others as they are.
-
-    Examples
-    --------
-    >>> stored("outcome", "corner"), stored("outcome", "stalled")
-    ('kink', 'stalled')
-    """
-    return VALUES.get(name, {}).get(value, value) if isinstance(value, str) else value
-
-
 def add_old_option(parser: ArgumentParser, old: str, new: str, **keywords: Any) -> None:
     """Let a command accept the old name of an option, which its help does not show.
 

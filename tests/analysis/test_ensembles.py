@@ -79,8 +79,8 @@ def test_averages_are_given_with_and_without_what_did_not_reach_its_goal(tmp_pat
 
 def test_shapes_with_other_parameters_and_protocols(tmp_path):
     one = superellipsoids(1.5, 0.8, 1.2)
-    write(tmp_path, "a", one, dimension=3, protocol=1)
-    write(tmp_path, "b", one, dimension=3, protocol=2, n_sweeps=50)
+    write(tmp_path, "a", one, dimension=3, protocol="yuan-2019-1")
+    write(tmp_path, "b", one, dimension=3, protocol="yuan-2019-2", n_sweeps=50)
     first, second = read_groups([tmp_path], needs=("exponent", "w1"))
     assert (first.protocol, second.protocol, second.n_sweeps) == ("yuan-2019-1", "yuan-2019-2", 50)
     assert (first.number("exponent"), first.number("w2")) == (1.5, 1.2)
@@ -98,24 +98,15 @@ def test_shapes_with_other_parameters_and_protocols(tmp_path):
 
 
 def test_ways_to_jamming_are_told_apart(tmp_path):
-    """Packings of dynamics tell no way, as those of earlier versions do not."""
+    """Packings of dynamics tell no protocol."""
     write(tmp_path, "a", bidisperse(1), seed=1)
-    write(tmp_path, "b", bidisperse(1), seed=2, way="quasistatic")
+    write(tmp_path, "b", bidisperse(1), seed=2, protocol="quasistatic")
     first, second = read_groups([tmp_path])
     assert (first.protocol, second.protocol) == ("", "quasistatic")
     assert of_paper(first)
     assert of_paper(second)
     assert system_labels([first, second])[first].endswith(", dynamics")
     assert system_labels([first, second])[second].endswith(", quasistatic")
-
-
-def test_files_of_earlier_versions_have_todays_names(tmp_path):
-    particles = superellipsoids(1.5)
-    packing = random_packing(8, 0.1, 1, particles, 3)
-    old = {"p": 1.5, "w1": 1.0, "w2": 1.0, "n": 8, "seed": 1, "outcome": "converged"}
-    write_packing(tmp_path / "old.h5", packing, old | {"protocol": 1, "pressure": 1e-6})
-    (system,) = read_groups([tmp_path / "old.h5"])
-    assert system.number("exponent") == 1.5
 
 
 def test_a_mixture_is_named_by_its_kinds(tmp_path):

@@ -45,22 +45,25 @@ def table(dimension=2, **packing):
         N,
         dimension,
     )
-    known = {"seed": 1, "n": N} | packing
+    known = {"seed": 1, "n": N, "shape": "spherocylinder"} | packing
     attributes = {f"packing_{name}": value for name, value in known.items()}
     return ModeTable(columns, np.empty((size, 0)), coordinates, np.empty(0), attributes)
 
 
-def test_system_and_energy_of_modes_old_and_new():
-    old = key_of(table(alpha=4.0, u0=1e-15))
-    assert (old.system.shape, old.system.dimension) == ("spherocylinder", 2)
-    assert (old.number("alpha"), old.number("u0")) == (4.0, 1e-15)
-    old = key_of(table(3, p=1.5, w1=1.0, w2=1.0, protocol=1, pressure=1e-6))
-    assert old.number("exponent") == 1.5
-    assert (old.u0, old.system.protocol) == (0.0, "yuan-2019-1")
+def test_system_and_energy_of_modes():
+    rods = key_of(table(alpha=4.0, u0=1e-15))
+    assert (rods.system.shape, rods.system.dimension) == ("spherocylinder", 2)
+    assert (rods.number("alpha"), rods.number("u0")) == (4.0, 1e-15)
+    known = {"exponent": 1.5, "w1": 1.0, "w2": 1.0, "protocol": "yuan-2019-1"}
+    bodies = key_of(table(3, shape="superellipsoid", **known))
+    assert bodies.number("exponent") == 1.5
+    assert (bodies.u0, bodies.system.protocol) == (0.0, "yuan-2019-1")
     assert key_of(table(alpha=1.0, shape="superellipsoid")).system.parameters == ()
     assert seed_of(table(seed=7)) == 7
+    shapeless = table(alpha=4.0)
+    del shapeless.attributes["packing_shape"]
     with pytest.raises(ValueError, match="do not state the shape"):
-        key_of(table(u0=1.0))
+        key_of(shapeless)
 
 
 def test_files_are_grouped_and_selected(tmp_path):

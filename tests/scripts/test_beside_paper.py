@@ -7,6 +7,7 @@ from test_figures_of_runs import PHI_J, compression
 import jamshape as js
 from common import published
 from jamshape.files.h5md import read_attributes
+from jamshape.measures.jamming import Jamming
 from jamshape.shapes.particles import Particles
 
 BESIDE = "marschall_2018/beside_paper.py"
@@ -24,7 +25,8 @@ def rows_of(found):
 
 
 def test_a_run(report, tmp_path):
-    run = compression(tmp_path / "run.h5", phi_unjams=0.86, phi_jams=0.87, frames_minimised=2)
+    found = Jamming(0.86, 0.87, 2).attributes()
+    run = compression(tmp_path / "run.h5", **found)
     found = report(BESIDE, "--run", run)
     assert found["n"] == [1024]
     rows = rows_of(found)

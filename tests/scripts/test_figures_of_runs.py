@@ -11,6 +11,7 @@ from pictures import image
 from written import write_content
 
 from jamshape.files.h5md import write_packing
+from jamshape.measures.jamming import Jamming
 from jamshape.measures.order import orientational_order
 from jamshape.packing import Box, Packing
 
@@ -194,7 +195,7 @@ def test_one_sample_has_the_error_of_its_fit_and_packings_are_marked(here, capsy
 def test_phi_j_by_frames_is_between_the_last_that_unjams_and_the_first_that_stays(report, tmp_path):
     jams = ((0.860, 0.862), (0.864, 0.868))
     runs = [
-        compression(tmp_path / f"{k}.h5", k, phi_unjams=low, phi_jams=high, frames_minimised=3)
+        compression(tmp_path / f"{k}.h5", k, **Jamming(low, high, 3).attributes())
         for k, (low, high) in enumerate(jams)
     ]
     [row] = report(SLOW, *runs, "--out", tmp_path / "slow.png")["rows"]
@@ -205,7 +206,7 @@ def test_phi_j_by_frames_is_between_the_last_that_unjams_and_the_first_that_stay
 
 
 def test_runs_without_a_bracket_tell_no_phi_j_by_frames(report, tmp_path):
-    one_end = {"phi_unjams": 0.86, "phi_jams": np.nan, "frames_minimised": 3}
+    one_end = Jamming(0.86, np.nan, 3).attributes()
     runs = [compression(tmp_path / "0.h5", 0, **one_end), compression(tmp_path / "1.h5", 1)]
     [row] = report(SLOW, *runs, "--out", tmp_path / "slow.png")["rows"]
     assert (row["phi_J(frames)"]["value"], row["phi_J(frames)"]["samples"]) == (None, 0)

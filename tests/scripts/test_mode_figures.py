@@ -76,7 +76,8 @@ def made_up(alpha, u, seed, *, n=N):
     order = np.argsort(values)
     columns = {name: values[order] for name, values in columns.items()}
     numbers = {"n_backbone": n, "n_modes": k, "z": 5.8}
-    packing = {"alpha": alpha, "u0": u, "seed": seed, "n": n, "size_ratio": 1.4}
+    packing = {"shape": "spherocylinder", "alpha": alpha, "u0": u, "seed": seed, "n": n}
+    packing["size_ratio"] = 1.4
     attributes = numbers | {f"packing_{name}": value for name, value in packing.items()}
     return ModeTable(columns, np.empty((3 * n, 0)), coordinates, np.empty(0), attributes)
 

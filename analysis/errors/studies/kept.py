@@ -10,7 +10,6 @@ from typing import Any
 from jamshape.command import plain
 from jamshape.files.disk import store
 from jamshape.files.h5md import read_packing, write_packing
-from jamshape.files.vocabulary import renamed
 from jamshape.flow.compression import Compression, CompressionRun
 from jamshape.lammps.session import Session
 from jamshape.packing import Packing
@@ -20,7 +19,8 @@ def kept(path: Path, make: Callable[..., dict[str, Any]], *arguments: Any) -> di
     """Return what was found before, or find it."""
     if not path.exists():
         store(path, json.dumps(plain(make(*arguments))).encode())
-    return renamed(json.loads(path.read_text()))
+    found: dict[str, Any] = json.loads(path.read_text())
+    return found
 
 
 def kept_packing(path: Path, make: Callable[[], Packing]) -> Packing:

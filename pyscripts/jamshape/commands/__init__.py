@@ -35,6 +35,7 @@ COMMANDS = {
     "draw": "draw packings",
     "info": "describe a file: its kind, its content, and how to continue it",
     "export": "export packings to other programs, such as OVITO and MDAnalysis",
+    "convert": "convert files of jamshape 0.1.0 to the present format",
     "initial": "make a random start without overlaps, for a deck or for Python",
     "plugin": "locate the LAMMPS plugin, and show how a deck loads it",
 }

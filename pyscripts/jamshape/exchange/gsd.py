@@ -27,13 +27,17 @@ from jamshape.exchange.tools import tool
 from jamshape.files.disk import PathLike, replacing
 from jamshape.files.frames import Form, row_of
 from jamshape.files.hdf5 import FileFormatError
+from jamshape.files.vocabulary import FORMAT_VERSION, require_format
 from jamshape.packing import Packing
 from jamshape.shapes.mesh import SurfaceMesh
 from jamshape.shapes.shape import Interaction
 from jamshape.shapes.solid import Balls, Solid, Superquadric
 from jamshape.shapes.table import shape_named
 
-_LOG, _PARTICLES = "jamshape/", "particles/jamshape/"
+LOG = "jamshape/"
+"""Prefix of the data of a packing in the log of a frame."""
+
+_PARTICLES = "particles/jamshape/"
 _COLUMNS = "columns/"
 
 _FINE, _COARSE = 3, 1  # levels of meshes, so that files stay small
@@ -112,14 +116,14 @@ def read_gsd(path: PathLike, frame: int = -1) -> Packing:
         If the file cannot be opened.
     """
     hoomd = tool("gsd.hoomd", "gsd")
-    with _opened(hoomd, path) as file:
+    with opened_gsd(hoomd, path) as file:
         return _packing(path, hoomd, file[row_of(frame, len(file), path)])
 
 
 def read_gsd_clock(path: PathLike) -> tuple[IntArray, FloatArray]:
     """Read steps (T,) and times (T,) of the frames; errors as `read_gsd`."""
-    with _opened(tool("gsd.hoomd", "gsd"), path) as file:
-        chunks = (("configuration/step", 0), (f"log/{_LOG}time", 0.0))
+    with opened_gsd(tool("gsd.hoomd", "gsd"), path) as file:
+        chunks = (("configuration/step", 0), (f"log/{LOG}time", 0.0))
         step, time = (
             [file.file.read_chunk(k, name)[0] if file.file.chunk_exists(k, name) else otherwise
              for k in range(len(file))]
@@ -128,7 +132,8 @@ def read_gsd_clock(path: PathLike) -> tuple[IntArray, FloatArray]:
         return np.array(step, np.int64), np.array(time, np.float64)
 
 
-def _opened(hoomd: Any, path: PathLike) -> Any:
+def opened_gsd(hoomd: Any, path: PathLike) -> Any:
+    """Open a GSD file for reading, or refuse it."""
     try:
         return hoomd.open(str(path), "r")
     except RuntimeError as error:
@@ -155,11 +160,12 @@ def _frame(hoomd: Any, packing: Packing, form: Form) -> Any:
     exact = {_PARTICLES + name: x for name, x in particle_fields(packing, rests=form.rests).items()}
     exact |= {f"{_PARTICLES}{_COLUMNS}{name}": x for name, x in packing.columns.items()}
     of_box = box_fields(packing, rests=form.rests, tilted=form.tilted)
-    exact |= {_LOG + name: x for name, x in of_box.items()}
-    exact[_LOG + "time"] = np.array([packing.time])
-    exact[_LOG + "law"] = np.array([*np.ravel(packing.law.k_e), packing.law.sides])
+    exact |= {LOG + name: x for name, x in of_box.items()}
+    exact[LOG + "time"] = np.array([packing.time])
+    exact[LOG + "format_version"] = np.array([FORMAT_VERSION])
+    exact[LOG + "law"] = np.array([*np.ravel(packing.law.k_e), packing.law.sides])
     # As numbers: OVITO before 3.17 fails on texts.
-    exact[_LOG + "shape_style"] = np.frombuffer(packing.shape_style.encode(), np.uint8)
+    exact[LOG + "shape_style"] = np.frombuffer(packing.shape_style.encode(), np.uint8)
     frame.log = exact
     return frame
 
@@ -227,7 +233,7 @@ def _mesh(surface: SurfaceMesh) -> dict[str, Any]:
 
 def _packing(path: PathLike, hoomd: Any, frame: Any) -> Packing:
     logged: Mapping[str, Any] = frame.log
-    prefixes = (_LOG, _PARTICLES)
+    prefixes = (LOG, _PARTICLES)
     found = {
         name.removeprefix(prefix): value
         for name, value in logged.items()
@@ -236,18 +242,20 @@ def _packing(path: PathLike, hoomd: Any, frame: Any) -> Packing:
     }
     try:
         style, time = bytes(found.pop("shape_style")).decode(), float(found.pop("time")[0])
+        require_format(path, int(found.pop("format_version", [2])[0]), "0.1.0")
         columns = [name for name in found if name.startswith(_COLUMNS)]
         found["columns"] = {name.removeprefix(_COLUMNS): found.pop(name) for name in columns}
-        if "law" in found:  # missing in files of 0.1.0
-            *numbers, sides = found["law"].tolist()
-            n = math.isqrt(len(numbers))
-            k_e = np.reshape(numbers, (n, n)) if n > 1 else numbers[0]
-            found["law"] = Interaction.told({"k_e": k_e, "sides": sides})
+        *numbers, sides = found["law"].tolist()
+        n = math.isqrt(len(numbers))
+        k_e = np.reshape(numbers, (n, n)) if n > 1 else numbers[0]
+        found["law"] = Interaction.told({"k_e": k_e, "sides": sides})
         packing = packing_of(found, style, int(frame.configuration.step), time)
         return as_edited(packing, _frame(hoomd, packing, Form.of(packing)), frame)
     except (KeyError, TypeError) as error:
         msg = f"{path}: holds no log/jamshape of a packing, expected a file of write_gsd"
         raise FileFormatError(msg) from error
+    except FileFormatError:
+        raise
     except ValueError as error:
         msg = f"{path}: {error}"
         raise FileFormatError(msg) from error

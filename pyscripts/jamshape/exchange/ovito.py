@@ -147,11 +147,10 @@ def from_ovito(data: Any) -> Packing:
         for name in ("position", "orientation", "edges", "tilt"):
             if f"{name}_rest" in fields:
                 fields[f"{name}_rest"] = as_rest(fields[f"{name}_rest"], fields[name])
-        # Data of 0.1.0 have no law.
-        law = {name: known.get(_PREFIX + name) for name in Interaction._fields}
+        law = {name: known[_PREFIX + name] for name in Interaction._fields}
         if isinstance(law["k_e"], str):  # a table
             law["k_e"] = stiffness_told(law["k_e"])
-        fields["law"] = Interaction.told({k: v for k, v in law.items() if v is not None})
+        fields["law"] = Interaction.told(law)
         style = str(known[_PREFIX + "shape style"])
         packing = packing_of(fields, style, int(known["Timestep"]), float(known["Time"]))
         return _as_turned(packing, np.asarray(particles["Orientation"][...]))

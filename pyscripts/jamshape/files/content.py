@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +23,9 @@ from jamshape.files.hdf5 import (
 )
 from jamshape.files.layout import Report, Series
 from jamshape.packing import Packing
+
+if TYPE_CHECKING:
+    import h5py
 
 _CHECKPOINT = "checkpoint"  # group of a file that is not finished
 
@@ -87,16 +90,22 @@ class Content:
     def read(cls, path: Path) -> Content:
         """Read a file; errors as `jamshape.files.h5md.read_packing`."""
         with layout.opened(path) as file:
-            n_frames = layout.count(file, "particles/all/position")
-            frames = [layout.read_frame(file, k) for k in range(n_frames)]
-            found = cls(path, frames, attributes(file, "parameters"))
-            for name in require_item(file, "observables"):
-                steps, times, values = layout.read_rows(file, name)
-                found.columns[name] = Column(steps.tolist(), times.tolist(), list(values))
-            rows = (column.tolist() for column in layout.read_report(file))
-            found.report = list(zip(*rows, strict=True))
+            found = cls.of(path, file)
             if has_item(file, _CHECKPOINT):
                 found.checkpoint = read_checkpoint(require_item(file, _CHECKPOINT))
+        return found
+
+    @classmethod
+    def of(cls, path: Path, file: h5py.File) -> Content:
+        """Read an open file of any format version, without a checkpoint."""
+        n_frames = layout.count(file, "particles/all/position")
+        frames = [layout.read_frame(file, k) for k in range(n_frames)]
+        found = cls(path, frames, attributes(file, "parameters"))
+        for name in require_item(file, "observables"):
+            steps, times, values = layout.read_rows(file, name)
+            found.columns[name] = Column(steps.tolist(), times.tolist(), list(values))
+        rows = (column.tolist() for column in layout.read_report(file))
+        found.report = list(zip(*rows, strict=True))
         return found
 
     def add_frame(self, frame: Packing) -> None:
@@ -125,28 +134,32 @@ class Content:
     def write(self) -> None:
         """Replace the file; errors as `jamshape.files.h5md.write_packing`."""
         with written(self.path) as file:
-            layout.write_metadata(file)
-            layout.write_particles(file.create_group("particles/all"), self.frames)
-            group = file.create_group("observables")
-            written_clocks: list[tuple[Column, Any]] = []
-            for name, column in self.columns.items():
-                values, element = np.array(column.values), group.create_group(name)
-                known = (of for other, of in written_clocks if other.has_clock_of(column))
-                if clock := next(known, None):  # most observables are in every row
-                    element["step"], element["time"] = clock["step"], clock["time"]
-                    put(element, "value", values)
-                    continue
-                series = Series(np.array(column.steps), np.array(column.times), values)
-                layout.write_rows(element, series)
-                written_clocks.append((column, element))
-            steps, seconds, errors = zip(*self.report, strict=True) if self.report else ((), (), ())
-            report = Report(
-                np.array(steps, np.int64), np.array(seconds, float), np.array(errors, float)
-            )
-            layout.write_rows(file.create_group("report"), report)
-            set_attributes(file.create_group("parameters"), self.attributes)
-            if self.checkpoint is not None:
-                write_checkpoint(file.create_group(_CHECKPOINT), self.checkpoint)
+            self.fill(file)
+
+    def fill(self, file: h5py.File) -> None:
+        """Write into an empty file."""
+        layout.write_metadata(file)
+        layout.write_particles(file.create_group("particles/all"), self.frames)
+        group = file.create_group("observables")
+        written_clocks: list[tuple[Column, Any]] = []
+        for name, column in self.columns.items():
+            values, element = np.array(column.values), group.create_group(name)
+            known = (of for other, of in written_clocks if other.has_clock_of(column))
+            if clock := next(known, None):  # most observables are in every row
+                element["step"], element["time"] = clock["step"], clock["time"]
+                put(element, "value", values)
+                continue
+            series = Series(np.array(column.steps), np.array(column.times), values)
+            layout.write_rows(element, series)
+            written_clocks.append((column, element))
+        steps, seconds, errors = zip(*self.report, strict=True) if self.report else ((), (), ())
+        report = Report(
+            np.array(steps, np.int64), np.array(seconds, float), np.array(errors, float)
+        )
+        layout.write_rows(file.create_group("report"), report)
+        set_attributes(file.create_group("parameters"), self.attributes)
+        if self.checkpoint is not None:
+            write_checkpoint(file.create_group(_CHECKPOINT), self.checkpoint)
 
 
 def _require_storable(name: str, row: NDArray[Any]) -> None:

@@ -21,7 +21,6 @@ from jamshape.files.h5md import (
     read_style,
 )
 from jamshape.files.outcomes import is_reached
-from jamshape.files.vocabulary import protocol_named
 from jamshape.packing import Packing
 from jamshape.shapes.table import shape_named
 
@@ -129,6 +128,6 @@ def system_of(attributes: Mapping[str, Any], shape: str, dimension: int) -> Syst
     told = set(names) <= attributes.keys()
     known = tuple((name, float(attributes[name])) for name in names if told)
     kinds = str(attributes.get("kinds", ""))
-    protocol = str(protocol_named(attributes.get("protocol", "")))
+    protocol = str(attributes.get("protocol", ""))
     sweeps = int(attributes.get("n_sweeps", 0))
     return System(shape, dimension, known, kinds, protocol, sweeps)

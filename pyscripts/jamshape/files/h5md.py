@@ -2,10 +2,8 @@ r"""Packings and runs as H5MD 1.1 files; a packing is a run with one frame.
 
 ::
 
-    /h5md               +version [1, 1]   author/+name   creator/+name, version, format_version (2; 1 if
-    missing), origin (platform that determines the last bits: `jamshape.files.origin`)
-    /particles/all      +shape_style   +k_e, sides: the law of the contacts (if missing, those
-    of /parameters, or else 1 and 2)
+    /h5md               +version [1, 1]   author/+name   creator/+name, version, format_version, origin (platform that determines the last bits: `jamshape.files.origin`)
+    /particles/all      +shape_style   +k_e, sides: the law of the contacts (1 and 2 if missing)
         box             +dimension D   +boundary D times "periodic"
             edges       {step, time, value (T, D), or (T, D, D) with the edge vectors as rows: for all
                         frames of a file that has a tilted box, the transposes of `Box.matrix`}
@@ -38,8 +36,7 @@ MDAnalysis refuses any box that is not three-dimensional, pairs row i of each ob
 i, whatever their steps, and fails on an observable with fewer rows than there are frames;
 `jamshape.exchange.mdanalysis` writes what it opens.
 
-Names are those of `jamshape.files.vocabulary`: files of earlier versions, which called a pressure or an
-exponent `p`, are read under today's names, and continued under these.
+Files of another format version are refused; `jamshape convert` rewrites those of jamshape 0.1.0.
 
 The specification: https://nongnu.org/h5md/h5md.html
 """
@@ -61,7 +58,6 @@ from jamshape.files.disk import PathLike, replacing, store
 from jamshape.files.frames import row_of
 from jamshape.files.hdf5 import FileFormatError, attribute, attributes, require_item
 from jamshape.files.layout import Report, Series
-from jamshape.files.vocabulary import FORMAT_VERSION, protocol_named, renamed
 from jamshape.packing import Packing
 from jamshape.shapes.table import DEFAULT
 
@@ -239,22 +235,18 @@ def count_frames(path: PathLike) -> int:
 def read_attributes(path: PathLike) -> dict[str, Any]:
     """Read the attributes, as bool, int, float, str or array; errors as `read_packing`."""
     with layout.opened(path) as file:
-        found = renamed(attributes(file, "parameters"))
-    return found | {k: protocol_named(v) for k, v in found.items() if k == "protocol"}
+        return attributes(file, "parameters")
 
 
 def require_attributes(out: Path, expected: Mapping[str, Any], what: str = "a packing") -> None:
-    """Raise if a file has other attributes than expected; older files may lack some.
+    """Raise if a file has other attributes than expected.
 
     Raises
     ------
     ValueError
     """
     stored = read_attributes(out)
-    is_old = read_format_version(out) < FORMAT_VERSION
     for name, value in expected.items():
-        if is_old and name not in stored:
-            continue
         if not np.array_equal(stored.get(name, np.nan), value):
             msg = (
                 f"{out} holds {what} with {name} = {stored.get(name)}, expected {value};"
@@ -301,16 +293,15 @@ def _of_creator(path: PathLike, name: str, otherwise: str) -> str:
 def read_observables(path: PathLike) -> dict[str, NDArray[Any]]:
     """Read all observables as arrays (T, ...), T = 1 in a packing; errors as `read_packing`."""
     with layout.opened(path) as file:
-        found = {
+        return {
             name: layout.read_rows(file, name).value for name in require_item(file, "observables")
         }
-        return renamed(found)
 
 
 def read_series(path: PathLike, name: str) -> Series:
     """Read one observable with its steps and times; errors as `read_packing`."""
     with layout.opened(path) as file:
-        return layout.read_rows(file, layout.stored_name(file, name))
+        return layout.read_rows(file, name)
 
 
 def read_report(path: PathLike) -> Report:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _FORMAT = ("v110", "v110")  # has checksums of metadata; Debian 12 opens nothing newer
 _CHUNK_BYTES = 2**20
 _SMALL_BYTES = 1024  # HDF5 stores attributes above 4 kB without checksums
-_ATTRIBUTE_BYTES = 60_000  # HDF5 refused attributes of 64 kB and more in files of 0.1.0
+_ATTRIBUTE_BYTES = 60_000  # larger arrays are observables
 _GZIP, _SHUFFLE, _FLETCHER = 1, 2, 3  # numbers of HDF5's filters
 _LARGEST_RATIO = 1032  # of deflate
 _SYSTEM = {errno.EIO, errno.ESTALE, errno.EMFILE, errno.ENFILE}  # not about content

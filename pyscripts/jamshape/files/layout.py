@@ -40,7 +40,7 @@ from jamshape.files.hdf5 import (
     set_attributes,
 )
 from jamshape.files.origin import origin
-from jamshape.files.vocabulary import FORMAT_VERSION, former
+from jamshape.files.vocabulary import FORMAT_VERSION, require_format
 from jamshape.packing import Box, Packing
 from jamshape.packing.columns import MOST
 from jamshape.shapes.shape import Interaction
@@ -48,6 +48,9 @@ from jamshape.shapes.shape import Interaction
 if TYPE_CHECKING:
     import h5py
 
+
+CREATOR = "jamshape"
+"""Name of the program in the files that it writes."""
 
 _SAME_SIZE = 1e-12  # relative rounding difference between two copies of a size
 
@@ -95,6 +98,14 @@ def opened(path: PathLike) -> Iterator[h5py.File]:
 
 
 def check_h5md(file: h5py.File) -> None:
+    """Refuse a file of another version of H5MD, or of jamshape's format."""
+    check_version_of_h5md(file)
+    creator = require_item(file, "h5md/creator")
+    if str(attribute(creator, "name", "")) == CREATOR:
+        require_format(file.filename, version_of(file), str(attribute(creator, "version", "?")))
+
+
+def check_version_of_h5md(file: h5py.File) -> None:
     """Refuse a file of another version of H5MD."""
     version = np.ravel(attribute(require_item(file, "h5md"), "version", ())).tolist()
     if version[:1] != [1]:
@@ -124,13 +135,8 @@ def require_rows(
     return dataset
 
 
-def stored_name(file: h5py.File, name: str) -> str:
-    """Name under which a file holds an observable."""
-    return former(name, require_item(file, "observables"))
-
-
 def version_of(file: h5py.File) -> int:
-    """Read the version of the names in a file."""
+    """Read the version of the format of a file."""
     return int(attribute(require_item(file, "h5md/creator"), "format_version", 1))
 
 
@@ -147,18 +153,22 @@ def read_report(file: h5py.File) -> Report:
     return Report(*(require_rows(file, "report", name, n)[:n] for name in Report._fields))
 
 
+def version() -> str:
+    """Return the version of jamshape."""
+    try:
+        return importlib.metadata.version(CREATOR)
+    except importlib.metadata.PackageNotFoundError:
+        return "not installed"
+
+
 def write_metadata(file: h5py.File) -> None:
     """Write the metadata that H5MD requires."""
-    try:
-        version = importlib.metadata.version("jamshape")
-    except importlib.metadata.PackageNotFoundError:
-        version = "not installed"
     h5md = file.create_group("h5md")
     h5md.attrs["version"] = [1, 1]
     h5md.create_group("author").attrs["name"] = np.bytes_("unknown")
     creator = h5md.create_group("creator")
-    creator.attrs["name"] = np.bytes_("jamshape")
-    creator.attrs["version"] = np.bytes_(version)
+    creator.attrs["name"] = np.bytes_(CREATOR)
+    creator.attrs["version"] = np.bytes_(version())
     creator.attrs["format_version"] = FORMAT_VERSION
     creator.attrs["origin"] = np.bytes_(origin())
 
@@ -212,13 +222,11 @@ def _require_one_size(file: h5py.File, packing: Packing) -> None:
 
 
 def _read_law(file: h5py.File) -> Interaction:
-    """Read the law of the particles; files of 0.1.0 store it only among the attributes of runs."""
-    known: dict[str, Any] = {}
-    for place in filter(lambda name: has_item(file, name), ("parameters", "particles/all")):
-        group = require_item(file, place)
-        known |= {k: attribute(group, k) for k in Interaction._fields if k in group.attrs}
-        if "k_e" in group:  # a large table
-            known["k_e"] = require_dataset(group, "k_e")[()]
+    """Read the law of the particles."""
+    group = require_item(file, "particles/all")
+    known = {k: attribute(group, k) for k in Interaction._fields if k in group.attrs}
+    if "k_e" in group:  # a large table
+        known["k_e"] = require_dataset(group, "k_e")[()]
     try:
         return Interaction.told(known)
     except (TypeError, ValueError) as error:

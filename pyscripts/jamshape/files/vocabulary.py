@@ -1,22 +1,15 @@
-"""Names of attributes and observables, and their translation from earlier versions.
-
-Earlier, `p` was the pressure, and in files of bodies with axis ratios `w1` and `w2` the exponent; the
-protocols of Yuan et al. 2019 were numbered 1 and 2. Values that were renamed are in `jamshape.old_names`.
-"""
+"""Names in files, their version, and published protocols."""
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
-from typing import Any, TypeVar
+from collections.abc import Mapping
+from typing import Any
 
-from jamshape.old_names import stored
+from jamshape.files.disk import PathLike
+from jamshape.files.hdf5 import FileFormatError
 
-_Value = TypeVar("_Value")
-
-FORMAT_VERSION = 2
-"""Version of these names; 1 for files that do not state one."""
-
-_OLD, _PRESSURE = "p", "pressure"
+FORMAT_VERSION = 3
+"""Version of these names and of the layout; 2 and, for files that do not state one, 1 are those of jamshape 0.1.0."""
 
 COMPRESSED, ATHERMAL, THERMAL = "marschall-2018", "yuan-2019-1", "yuan-2019-2"
 """Published protocols, by name."""
@@ -25,28 +18,7 @@ MINIMISED = "minimise"
 """Protocol of a state of one's own that was minimised at its box."""
 
 NUMBERED: Mapping[int, str] = {1: ATHERMAL, 2: THERMAL}
-"""Protocols that earlier versions numbered."""
-
-_RATIO = "w1"  # only in files of bodies with an exponent
-
-
-def renamed(found: Mapping[str, _Value]) -> dict[str, _Value]:
-    """Return attributes or observables of a file under their current names.
-
-    Entries with a current name stay as they are.
-
-    Examples
-    --------
-    >>> renamed({"alpha": 4.0, "p": 1e-8})
-    {'alpha': 4.0, 'pressure': 1e-08}
-    >>> renamed({"p": 1.5, "w1": 1.0, "pressure": 1e-6})
-    {'exponent': 1.5, 'w1': 1.0, 'pressure': 1e-06}
-    >>> renamed({"way": "quasistatic", "outcome": "corner"})
-    {'protocol': 'quasistatic', 'outcome': 'kink'}
-    """
-    names = {_OLD: "exponent" if _RATIO in found else _PRESSURE, "way": "protocol"}
-    now = {names.get(name, name): value for name, value in found.items()}
-    return {name: stored(name, value) for name, value in now.items()}
+"""Protocols by their numbers in Yuan et al. 2019."""
 
 
 def protocol_named(value: Any) -> Any:
@@ -60,6 +32,25 @@ def protocol_named(value: Any) -> Any:
     return {str(number): name for number, name in NUMBERED.items()}.get(str(value), value)
 
 
-def former(name: str, stored: Container[str]) -> str:
-    """Return the name under which a file holds an observable: the current one, or that of earlier versions."""
-    return _OLD if name == _PRESSURE and name not in stored else name
+def require_format(path: PathLike, version: int, creator: str) -> None:
+    """Refuse a file of another format version.
+
+    Parameters
+    ----------
+    path : path-like
+    version : int
+        Format version of the file.
+    creator : str
+        Version of jamshape that wrote it.
+
+    Raises
+    ------
+    FileFormatError
+    """
+    if version == FORMAT_VERSION:
+        return
+    advice = (
+        f"run jamshape convert {path}" if version < FORMAT_VERSION else "read it with that version"
+    )
+    msg = f"{path} was written by jamshape {creator} (format {version}), expected format {FORMAT_VERSION}; {advice}"
+    raise FileFormatError(msg)

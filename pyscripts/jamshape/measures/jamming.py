@@ -35,8 +35,7 @@ _VERDICTS = {
     Outcome.KINK: True,
 }
 
-_NAMES = {"unjams": "phi_unjams", "jams": "phi_jams", "tried": "frames_minimised"}
-_UNDECIDED = "frames_undecided"  # files of earlier versions do not have it
+_NAMES = ("phi_unjams", "phi_jams", "frames_minimised", "frames_undecided")
 
 
 class Tried(NamedTuple):
@@ -82,10 +81,10 @@ class Jamming(NamedTuple):
     @classmethod
     def stored(cls, attributes: Mapping[str, Any]) -> Jamming | None:
         """Read it from the attributes of a run, if stored; else None."""
-        if not set(_NAMES.values()) <= attributes.keys():
+        if not set(_NAMES) <= attributes.keys():
             return None
-        unjams, jams, tried = (attributes[name] for name in _NAMES.values())
-        return cls(float(unjams), float(jams), int(tried), int(attributes.get(_UNDECIDED, 0)))
+        unjams, jams, *counts = (attributes[name] for name in _NAMES)
+        return cls(float(unjams), float(jams), *map(int, counts))
 
     @property
     def phi_J(self) -> float:
@@ -105,8 +104,7 @@ class Jamming(NamedTuple):
 
     def attributes(self) -> dict[str, Any]:
         """Return its numbers as attributes."""
-        found = {name: getattr(self, own) for own, name in _NAMES.items()}
-        return found | {_UNDECIDED: self.undecided}
+        return dict(zip(_NAMES, self, strict=True))
 
     def text(self) -> str:
         """Describe the bracket, as the end of a sentence."""

@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from jamshape.files.ensembles import System, system_of
-from jamshape.files.vocabulary import renamed
 from jamshape.packing import Packing
-from jamshape.shapes.table import SHAPES
 from jamshape.vibration.table import ModeTable
 
 TOLD = ("low", "middle", "high")  # bands
 
-_PREFIX = "packing_"  # of attributes copied from the packing's file
+PREFIX = "packing_"
+"""Of the attributes that modes copy from the file of their packing."""
 
 
 class Key(NamedTuple):
@@ -34,31 +33,29 @@ class Key(NamedTuple):
 def of_packing(table: ModeTable) -> dict[str, Any]:
     """Return the attributes of the packing's file."""
     known = table.attributes.items()
-    own = {name.removeprefix(_PREFIX): v for name, v in known if name.startswith(_PREFIX)}
-    return renamed(own)
+    return {name.removeprefix(PREFIX): v for name, v in known if name.startswith(PREFIX)}
 
 
 def to_store(attributes: Mapping[str, Any], packing: Packing) -> dict[str, Any]:
     """Return the attributes that a file of modes copies from its packing: those of its file, shape and law."""
     known = dict(attributes) | {"shape": packing.shape_style, **packing.law._asdict()}
-    return {f"{_PREFIX}{name}": value for name, value in known.items()}
+    return {f"{PREFIX}{name}": value for name, value in known.items()}
 
 
 def key_of(table: ModeTable) -> Key:
-    """Return system and u0 of a packing; 0 for a first jammed packing without a target energy."""
+    """Return system and u0 of a packing; 0 for a first jammed packing without a target energy.
+
+    Raises
+    ------
+    ValueError
+        If the modes do not state the shape of their packing.
+    """
     known = of_packing(table)
-    shape = known.get("shape") or _shape_with(known)
+    if "shape" not in known:
+        msg = "modes do not state the shape of their packing, expected modes of a packing of make_packing.py"
+        raise ValueError(msg)
     u0 = float(known.get("u0", 0.0))
-    return Key(system_of(known, shape, table.coordinates.dimension), u0)
-
-
-def _shape_with(known: Mapping[str, Any]) -> str:
-    """Name the first shape whose parameters are all present, for older files without a shape name."""
-    for name, shape in SHAPES.items():
-        if all(parameter.name in known for parameter in shape.parameters):
-            return name
-    msg = "modes do not state the shape of their packing, expected modes of a packing of make_packing.py"
-    raise ValueError(msg)
+    return Key(system_of(known, known["shape"], table.coordinates.dimension), u0)
 
 
 def count_of(table: ModeTable, name: str) -> int | None:

@@ -2,8 +2,7 @@
 
 ::
 
-    /modes          eigenvalues, omega, sign, solver_error, entry_error, overlap_error (0 of earlier versions),
-    state_error, is_translation, participation, parallel, perpendicular, rotation, of_round (k,); band (k,), see `BANDS`;
+    /modes          eigenvalues, omega, sign, solver_error, entry_error, overlap_error, state_error, is_translation, participation, parallel, perpendicular, rotation, of_round (k,); band (k,), see `BANDS`;
     vectors (n, k) if requested
     /coordinates    particle, kind (n,), direction (n, D + T): see `jamshape.vibration.hessian.Coordinates`
     /singular_values
@@ -24,6 +23,8 @@ from jamshape.arrays import FloatArray, IntArray
 from jamshape.files import hdf5
 from jamshape.files.disk import PathLike
 from jamshape.files.hdf5 import FileFormatError
+from jamshape.files.layout import version
+from jamshape.files.vocabulary import FORMAT_VERSION, require_format
 from jamshape.landscape import Landscape, State
 from jamshape.vibration.elasticity import Moduli, Modulus, moduli
 from jamshape.vibration.hessian import LARGEST_RESIDUAL, Coordinates, DynamicalMatrix
@@ -37,19 +38,22 @@ BANDS = {-1: "translation", 0: "low", 1: "middle", 2: "high", 3: "none"}
 _TRANSLATION, _HIGH, _NONE = -1, 2, 3
 
 MODULI = ("bulk", "pure_shear", "simple_shear")
-_COUNTS = ("n_floppy_left_out", "n_unsettled_left_out", "n_negative_modes")
-_PARTS = ("affine", "rounding", "of_state")
+COUNTS = ("n_floppy_left_out", "n_unsettled_left_out", "n_negative_modes")
+"""Attributes with the counts of `Moduli`."""
 
-# Contributions to the error bound of each eigenvalue.
-_ERRORS = ("solver_error", "entry_error", "overlap_error")
+PARTS = ("affine", "rounding", "of_state")
+"""Ends of the names of attributes with parts of a `Modulus`."""
+
+ERRORS = ("solver_error", "entry_error", "overlap_error")
+"""Columns that contribute to the error bound of each eigenvalue."""
 
 _COLUMNS = (
-    *("eigenvalues", "omega", "sign", *_ERRORS, "state_error", "is_translation"),
+    *("eigenvalues", "omega", "sign", *ERRORS, "state_error", "is_translation"),
     *("participation", "parallel", "perpendicular", "rotation", "of_round", "band"),
 )
 
 _REQUIRED = (
-    *(f"modes/{name}" for name in _COLUMNS if name != "overlap_error"),
+    *(f"modes/{name}" for name in _COLUMNS),
     *(f"coordinates/{name}" for name in ("particle", "kind", "direction")),
     *("singular_values", "parameters"),
 )
@@ -83,7 +87,7 @@ class ModeTable:
     @property
     def bound(self) -> FloatArray:
         """(k,) bound of the error of each eigenvalue of this state."""
-        return np.asarray(np.sum([self[name] for name in _ERRORS], axis=0))
+        return np.asarray(np.sum([self[name] for name in ERRORS], axis=0))
 
     def in_band(self, name: str) -> IntArray:
         """Rows of the modes of one band."""
@@ -103,8 +107,7 @@ class ModeTable:
     @property
     def n_vibrational(self) -> int:
         """Number of modes of the packing without translations, whether or not they were found."""
-        n_translations = self.attributes.get("n_translations", self["is_translation"].sum())
-        return int(self.attributes["n_modes"] - n_translations)
+        return int(self.attributes["n_modes"] - self.attributes["n_translations"])
 
     @property
     def imbalance(self) -> str:
@@ -116,10 +119,10 @@ class ModeTable:
 
     @property
     def moduli(self) -> Moduli:
-        """Elastic moduli; bounds are inf in files of versions that did not have them."""
+        """Elastic moduli."""
         a = self.attributes
         bulk, pure_shear, simple_shear = (_stored_modulus(a, f"{name}_modulus") for name in MODULI)
-        counts = (int(a.get(name, 0)) for name in _COUNTS)
+        counts = (int(a[name]) for name in COUNTS)
         return Moduli(bulk, pure_shear, simple_shear, a["pressure"], *counts)
 
 
@@ -197,18 +200,18 @@ def _to_store(elastic: Moduli) -> dict[str, Any]:
     """Spread moduli over attributes."""
     found: dict[str, Any] = {"pressure": elastic.pressure}
     counts = (elastic.n_floppy, elastic.n_unsettled, elastic.n_negative)
-    found |= dict(zip(_COUNTS, counts, strict=True))
+    found |= dict(zip(COUNTS, counts, strict=True))
     for name in MODULI:
         modulus: Modulus = getattr(elastic, name)
         key = f"{name}_modulus"
         found |= {key: modulus.relaxed, f"{key}_bound": modulus.bound}
-        found |= {f"{key}_{part}": getattr(modulus, part) for part in _PARTS}
+        found |= {f"{key}_{part}": getattr(modulus, part) for part in PARTS}
         found |= {f"{key}_reason": modulus.reason} if modulus.reason else {}
     return found
 
 
 def _stored_modulus(attributes: Mapping[str, Any], key: str) -> Modulus:
-    affine, rounding, of_state = (float(attributes.get(f"{key}_{p}", np.inf)) for p in _PARTS)
+    affine, rounding, of_state = (float(attributes[f"{key}_{p}"]) for p in PARTS)
     reason = str(attributes.get(f"{key}_reason", ""))
     return Modulus(float(attributes[key]), affine, rounding, of_state, reason)
 
@@ -236,6 +239,7 @@ def write_modes(
     with hdf5.written(path) as file:
         for name in _COLUMNS:
             hdf5.put(file, f"modes/{name}", table[name])
+        hdf5.set_attributes(file["modes"], {"format_version": FORMAT_VERSION, "version": version()})
         if vectors:
             hdf5.put(file, "modes/vectors", table.vectors)
         for name in ("particle", "kind", "direction"):
@@ -257,10 +261,11 @@ def read_modes(path: PathLike) -> ModeTable:
         If it cannot be opened.
     """
     with hdf5.reading(path) as file:
-        if not all(hdf5.has_item(file, name) for name in _REQUIRED):
-            msg = f"{path}: is not a complete file of modes, expected one written by analysis/modes.py"
-            raise FileFormatError(msg)
-        return _read(file)
+        if hdf5.has_item(file, "modes"):
+            group = hdf5.require_item(file, "modes")
+            creator = str(hdf5.attribute(group, "version", "0.1.0"))
+            require_format(path, int(hdf5.attribute(group, "format_version", 2)), creator)
+        return table_of(file)
 
 
 def holds_modes(path: PathLike) -> bool:
@@ -269,7 +274,12 @@ def holds_modes(path: PathLike) -> bool:
         return hdf5.has_item(file, "modes")
 
 
-def _read(file: h5py.File) -> ModeTable:
+def table_of(file: h5py.File) -> ModeTable:
+    """Read an open file."""
+    if not all(hdf5.has_item(file, name) for name in _REQUIRED):
+        msg = f"{file.filename}: is not a complete file of modes, expected one of jamshape modes"
+        raise FileFormatError(msg)
+
     def read(name: str, *shape: int) -> NDArray[Any]:
         """Read a dataset of this shape, -1 for any extent."""
         dataset = hdf5.require_dataset(file, name)
@@ -291,11 +301,7 @@ def _read(file: h5py.File) -> ModeTable:
         read("coordinates/direction", n, 3 * dimension - 3),
     )
     coordinates = Coordinates(particle, kind, direction, n_all, dimension)
-    # Files of earlier versions do not state the effect of rounding of overlaps.
-    known = [name for name in _COLUMNS if name != "overlap_error" or _has_column(file, name)]
-    columns = {"overlap_error": np.zeros(k)} | {name: read(f"modes/{name}", k) for name in known}
-    for name in ("eigenvalues", "omega", *_ERRORS):  # earlier versions stored rounding errors here
-        columns[name] = np.where(columns["is_translation"], 0.0, columns[name])
+    columns = {name: read(f"modes/{name}", k) for name in _COLUMNS}
     stored = read("modes/vectors", n, k) if _has_column(file, "vectors") else np.empty((n, 0))
     is_impossible = dimension not in {2, 3} or (
         n and not 0 <= particle.min() <= particle.max() < n_all

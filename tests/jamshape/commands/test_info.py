@@ -49,7 +49,7 @@ def test_a_packing(jamshape, tiny, name, rate, made):
     assert report["kinds"] == [kind | {"size": 1.0}, kind | {"size": 1.4}]
     assert lines["particles"].startswith("16 spherocylinders in 2D, 8 with alpha 1, 2R = 1; 8 with")
     assert lines["made with"] == made
-    assert "format 2" in lines["written by"]
+    assert "format 3" in lines["written by"]
     assert "continue with" not in lines
 
 

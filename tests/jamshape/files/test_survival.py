@@ -268,13 +268,3 @@ def test_other_errors_of_a_body_are_left_alone(tmp_path):
     with pytest.raises(FileNotFoundError, match="source"):
         body()
     assert not list(tmp_path.iterdir())
-
-
-# --- files of earlier versions -----------------------------------------------------------------
-
-
-def test_a_file_of_an_earlier_version_is_read(whole):
-    with h5py.File(whole, "r+") as file:
-        del file["h5md/creator"].attrs["format_version"]
-        file.move("observables/pressure", "observables/p")
-    assert read_series(whole, "pressure").step[-1] == ROWS

@@ -7,9 +7,7 @@ import pytest
 
 import jamshape as js
 from jamshape.files.h5md import read_attributes
-from jamshape.files.vocabulary import renamed
 from jamshape.old_names import current
-from jamshape.protocols.defaults import PROTOCOLS
 
 
 def test_old_names_of_arguments_and_values_warn_and_work(tmp_path):
@@ -71,15 +69,3 @@ def test_old_options_warn_and_work(tmp_path):
         "jamshape pack: warning: --way is called --protocol now; the old name goes" in done.stderr
     )
     assert read_attributes(tmp_path / "packing.h5")["n"] == 8
-
-
-def test_files_of_earlier_versions_speak_the_language_of_today():
-    assert set(PROTOCOLS) >= {"quasistatic", "dynamics", "steps"}
-    old = {"way": "quasistatic", "outcome": "corner", "search": "halving", "method": "paper"}
-    new = {
-        "protocol": "quasistatic",
-        "outcome": "kink",
-        "search": "bisection",
-        "method": "cg_marschall",
-    }
-    assert renamed(old) == new

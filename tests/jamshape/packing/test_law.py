@@ -1,6 +1,5 @@
 """The law of contacts belongs to a packing, whatever becomes of it."""
 
-import h5py
 import numpy as np
 import pytest
 from scenes import make
@@ -9,7 +8,7 @@ import jamshape as js
 from common.spines import with_spines
 from jamshape.contacts import Contacts, find_contacts, forces
 from jamshape.exchange.gsd import read_gsd, write_gsd
-from jamshape.files.h5md import read_packing, write_packing, write_run
+from jamshape.files.h5md import read_packing, write_run
 from jamshape.front.packing import public
 from jamshape.landscape import Landscape, State
 
@@ -77,15 +76,6 @@ def test_frames_of_a_file_have_one_law(rods, tmp_path):
     pytest.importorskip("gsd")
     write_gsd(tmp_path / "run.gsd", [rods, rods.with_(law=js.Interaction())])
     assert [read_gsd(tmp_path / "run.gsd", k).law for k in (0, 1)] == [LAW, js.Interaction()]
-
-
-def test_files_of_before_say_it_among_attributes_or_not_at_all(rods, tmp_path):
-    for attributes, expected in (({"k_e": 2.0, "sides": 1}, (2, 1)), ({}, (1, 2))):
-        write_packing(tmp_path / "old.h5", rods, attributes)
-        with h5py.File(tmp_path / "old.h5", "a") as file:
-            for name in LAW._fields:
-                del file["particles/all"].attrs[name]
-        assert read_packing(tmp_path / "old.h5").law == expected
 
 
 @pytest.mark.parametrize("law", [(0, 2), (1, 3), (np.nan, 2), ("one", 2), (1,), None, (1, 1.5)])

@@ -124,13 +124,14 @@ def test_what_is_none_of_a_protocol_is_refused(words, run, monkeypatch):
     assert "\n" not in str(error.value)
 
 
-def test_files_with_numbered_protocols_are_those_of_the_names(tmp_path):
+def test_files_of_protocols_are_those_of_their_numbers(tmp_path):
     recipe = recipe_for(RODS, protocol="steps", n=16)
-    old = recipe.attributes() | {"protocol": 1, "outcome": "converged"}
-    out, sizes = tmp_path / "old.h5", recipe.particles.sample(16, np.random.default_rng(1))
-    write_packing(out, frames()[0].with_(diameters=sizes.diameters), old)
+    known = recipe.attributes() | {"outcome": "converged"}
+    out, sizes = tmp_path / "packing.h5", recipe.particles.sample(16, np.random.default_rng(1))
+    write_packing(out, frames()[0].with_(diameters=sizes.diameters), known)
     assert read_attributes(out)["protocol"] == "yuan-2019-1"
     require_same(out, recipe)
+    require_same(out, recipe_for(RODS, protocol=1, n=16))
     with pytest.raises(ValueError, match="protocol = yuan-2019-1, expected yuan-2019-2"):
         require_same(out, recipe_for(RODS, protocol=2, n=16, phi_thermal=0.5))
 
