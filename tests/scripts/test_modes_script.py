@@ -122,7 +122,7 @@ def test_problems_are_one_sentence(packing, tmp_path):
     (tmp_path / "text.h5").write_text("no")
     for path, words in (
         (tmp_path / "wide.h5", "all 8 particles are rattlers"),
-        (tmp_path / "text.h5", "is not an HDF5 file"),
+        (tmp_path / "text.h5", "expected a complete data file"),
         (tmp_path / "missing.h5", "No such file"),
     ):
         done = run(path, "--out", tmp_path / "m.h5")
