@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jamshape.arguments import checked
-from jamshape.arrays import FloatArray, IntArray
 from jamshape.checks import Range, require_in, require_no_effect, require_one_of, require_other_file
 from jamshape.files.disk import require_hdf5_name, settled
 from jamshape.files.outcomes import warn_unless_reached
 from jamshape.front.packing import Packing
 from jamshape.front.reading import Held, packing_of
 from jamshape.landscape import Landscape, State
-from jamshape.vibration.elasticity import Moduli
 from jamshape.vibration.ensembles import TOLD, to_store
 from jamshape.vibration.hessian import DynamicalMatrix, DynamicalMatrixOptions, dynamical_matrix
 from jamshape.vibration.sparse_modes import lowest as lowest_modes
@@ -23,7 +21,6 @@ from jamshape.vibration.sparse_modes import near as modes_near
 from jamshape.vibration.sparse_modes import with_translations
 from jamshape.vibration.spectrum import METHODS, Spectrum, spectrum
 from jamshape.vibration.table import (
-    BANDS,
     ModeTable,
     holds_modes,
     read_modes,
@@ -42,14 +39,14 @@ _LEAST_FORCE = Range(0.0, 100.0, "mean forces of a bond")
 FEW = 20  # default number of modes of the sparse method
 
 
-@dataclass(frozen=True, eq=False)
-class Modes:
-    """Modes of a packing by ascending eigenvalue, with their properties.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Modes(ModeTable):
+    """Modes of a packing by ascending eigenvalue, with their properties; ``modes["participation"]`` looks up a column.
 
     Parameters
     ----------
-    table : ModeTable
-        All columns; ``modes["participation"]`` looks one up.
+    columns, vectors, coordinates, singular_values, attributes
+        See `jamshape.vibration.table.ModeTable`.
     about : mapping of str to number or str
         Properties of the packing.
     packing : Packing, optional
@@ -69,9 +66,11 @@ class Modes:
     (48, 2)
     >>> modes
     <48 modes (... high) of 16 of 16 particles held by 4... bonds: z = 5...>
+    >>> bulk = modes.moduli.bulk
+    >>> bulk.bound < 1e-6 * bulk.relaxed
+    True
     """
 
-    table: ModeTable
     about: dict[str, Any]
     packing: Packing | None = None
     file: Path | None = None
@@ -81,69 +80,27 @@ class Modes:
         object.__setattr__(self, "file", settled(self.file))
 
     @classmethod
+    def of(cls, table: ModeTable, about: dict[str, Any], **more: Any) -> Modes:
+        """Make modes of a table, the properties of their packing, and what else is known of them."""
+        return cls(
+            **{one.name: getattr(table, one.name) for one in fields(ModeTable)}, about=about, **more
+        )
+
+    @classmethod
     def read(cls, path: Path) -> Modes:
         """Read modes from a file; errors as `read_modes`."""
         table = read_modes(path)
-        return cls(table, dict(table.attributes), None, path)
+        return cls.of(table, dict(table.attributes), file=path)
 
     @property
-    def told(self) -> ModeTable:
-        """The table, with the properties of the packing among its attributes as in a file."""
-        return replace(self.table, attributes=self.about | self.table.attributes)
+    def table(self) -> Modes:
+        """The modes themselves, an old name."""
+        return self
 
     @property
-    def eigenvalues(self) -> FloatArray:
-        """(k,) eigenvalues of the dynamical matrix, ascending, [energy / length^2]."""
-        return self.table["eigenvalues"]
-
-    @property
-    def omega(self) -> FloatArray:
-        """(k,) frequencies sign(lambda) sqrt(abs(lambda))."""
-        return self.table["omega"]
-
-    @property
-    def participation(self) -> FloatArray:
-        """(k,) participation ratios; in 2D 3 if x, y and rotation share equally, 1/N for one coordinate."""
-        return self.table["participation"]
-
-    @property
-    def vectors(self) -> FloatArray:
-        """(n, k) unit columns in the coordinates of ``table.coordinates``."""
-        return self.table.vectors
-
-    def __getitem__(self, name: str) -> Any:
-        return self.table[name]
-
-    def __len__(self) -> int:
-        return len(self.table["eigenvalues"])
-
-    def in_band(self, name: str) -> IntArray:
-        """Rows of the modes of a band: translation, low, middle or high.
-
-        Empty where bands do not separate, as far above jamming; ``repr(modes)`` gives the reason.
-        """
-        require_one_of("band", name, BANDS.values())
-        return self.table.in_band(name)
-
-    @property
-    def vibrational(self) -> IntArray:
-        """Rows of all modes but translations, which are flagged by ``modes["is_translation"]`` and have omega = 0."""
-        return self.table.vibrational
-
-    @property
-    def moduli(self) -> Moduli:
-        """Elastic moduli ``bulk``, ``pure_shear`` and ``simple_shear``, each with its ``bound``.
-
-        Examples
-        --------
-        >>> import jamshape as js
-        >>> discs = js.Spherocylinders(alpha=0)
-        >>> packing = js.make_packing(discs, n=16, u0=1e-8, file="dense_discs.h5", progress=False)
-        >>> bulk = js.modes(packing).moduli.bulk
-        >>> bulk.bound < 1e-6 * bulk.relaxed
-        True
-        """
-        return self.table.moduli
+    def told(self) -> Modes:
+        """The modes, with the properties of the packing among their attributes as in a file."""
+        return replace(self, attributes=self.about | self.attributes)
 
     def plot(self, axes: Axes | None = None, **look: Any) -> Axes:
         """Draw the density of their frequencies; arguments as in `jamshape.plot`."""
@@ -163,17 +120,17 @@ class Modes:
         read = [self.packing.file] if self.packing and self.packing.file else []
         require_hdf5_name(Path(path))
         require_modes_file(Path(path), read)
-        write_modes(path, self.table, self.about, vectors=vectors)
+        write_modes(path, self, self.about, vectors=vectors)
 
     def __repr__(self) -> str:
-        known = [name for name in TOLD if self.table.has_band(name)]
+        known = [name for name in TOLD if self.has_band(name)]
         counts = ", ".join(f"{len(self.in_band(name))} {name}" for name in known)
-        a = self.table.attributes
+        a = self.attributes
         of = f"{a['n_backbone']} of {a['n']} particles held by {a['n_bonds']} bonds"
         is_whole = len(self) == a["n_modes"]
         bands = f" ({counts or 'no bands'})" if is_whole else f" of {a['n_modes']}"
         why = f"; {a['why_no_bands']}" if is_whole and "why_no_bands" in a else ""
-        why += f"; {self.table.imbalance}" if self.table.imbalance else ""
+        why += f"; {self.imbalance}" if self.imbalance else ""
         return f"<{len(self)} modes{bands} of {of}: z = {a['z']:.4g}{why}>"
 
     def _repr_html_(self) -> str:
@@ -285,7 +242,7 @@ def modes(
     table = tabulate(landscape, state, matrix, found)
     asked = {"rotation": rotation, "least_force": least_force}
     about = to_store(measured.results, measured) | asked
-    return Modes(table, about, measured, matrix=matrix)
+    return Modes.of(table, about, packing=measured, matrix=matrix)
 
 
 def _found(

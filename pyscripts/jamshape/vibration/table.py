@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jamshape.arrays import FloatArray, IntArray
+from jamshape.checks import require_one_of
 from jamshape.files import hdf5
 from jamshape.files.disk import PathLike
 from jamshape.files.hdf5 import FileFormatError
@@ -84,13 +85,35 @@ class ModeTable:
         """Return a column by name."""
         return self.columns[name]
 
+    def __len__(self) -> int:
+        return len(self["eigenvalues"])
+
+    @property
+    def eigenvalues(self) -> FloatArray:
+        """(k,) eigenvalues of the dynamical matrix, ascending, [energy / length^2]."""
+        return self["eigenvalues"]
+
+    @property
+    def omega(self) -> FloatArray:
+        """(k,) frequencies sign(lambda) sqrt(abs(lambda))."""
+        return self["omega"]
+
+    @property
+    def participation(self) -> FloatArray:
+        """(k,) participation ratios; in 2D 3 if x, y and rotation share equally, 1/N for one coordinate."""
+        return self["participation"]
+
     @property
     def bound(self) -> FloatArray:
         """(k,) bound of the error of each eigenvalue of this state."""
         return np.asarray(np.sum([self[name] for name in ERRORS], axis=0))
 
     def in_band(self, name: str) -> IntArray:
-        """Rows of the modes of one band."""
+        """Rows of the modes of a band: translation, low, middle or high.
+
+        Empty where bands do not separate, as far above jamming; ``repr(modes)`` gives the reason.
+        """
+        require_one_of("band", name, BANDS.values())
         code = next(code for code, word in BANDS.items() if word == name)
         return np.flatnonzero(self["band"] == code)
 
@@ -101,7 +124,7 @@ class ModeTable:
 
     @property
     def vibrational(self) -> IntArray:
-        """Rows of all modes but translations."""
+        """Rows of all modes but translations, which are flagged by ``modes["is_translation"]`` and have omega = 0."""
         return np.flatnonzero(~np.asarray(self["is_translation"], bool))
 
     @property
