@@ -28,8 +28,8 @@ def members(stub):
     for base in stub.bases:
         found |= members(CLASSES[base.id])
     for x in stub.body:
-        if isinstance(x, ast.FunctionDef):
-            found[x.name] = x
+        if isinstance(x, ast.FunctionDef):  # with its overloads
+            found[x.name] = [*(found.get(x.name, []) if x.decorator_list else []), x]
         elif isinstance(x, ast.AnnAssign):
             found[x.target.id] = x
     return found
@@ -42,8 +42,8 @@ def arguments_of_stub(function):
     return [(name, k >= n_required) for k, name in enumerate(plain)]
 
 
-def arguments_of(compiled):
-    signature = compiled.__nb_signature__[0][0]
+def arguments_of(compiled, overload=0):
+    signature = compiled.__nb_signature__[overload][0]
     inside = re.fullmatch(r"def \w+\((.*)\) -> .*", signature, re.DOTALL).group(1)
     names = re.findall(r"(?:^|, )(\w+)(?:: ((?:\[[^\]]*\]|[^,\[])*))?", strip_brackets(inside))
     return [(name, "=" in kind) for name, kind in names]
@@ -72,7 +72,10 @@ def test_a_class_has_the_members_of_the_stub(name):
     has = {x for x in vars(compiled) if not x.startswith("_")}
     assert has == {x for x in stub if not x.startswith("_")}
     for member, definition in stub.items():
-        if isinstance(definition, ast.FunctionDef):
-            assert arguments_of(getattr(compiled, member)) == arguments_of_stub(definition)
+        if isinstance(definition, list):
+            has = getattr(compiled, member)
+            assert len(getattr(has, "__nb_signature__", [0])) == len(definition), member
+            for k, one in enumerate(definition):
+                assert arguments_of(has, k) == arguments_of_stub(one)
         else:
             assert not inspect.isroutine(inspect.getattr_static(compiled, member))

@@ -8,7 +8,8 @@ import io
 from typing import TYPE_CHECKING, Any
 
 from jamshape.arguments import ArgumentTypeError, checked
-from jamshape.checks import ArgumentError, said
+from jamshape.checks import ArgumentError, require_one_of, said
+from jamshape.drawing.colors import CHOICES
 from jamshape.drawing.ladder import Rungs, draw_rungs
 from jamshape.drawing.modes import draw_density
 from jamshape.drawing.packing import Look, add_legend, colorings, draw_packing
@@ -54,8 +55,9 @@ def plot(
     axes : matplotlib Axes, optional
         Axes without a projection, for packings in space too; by default a new figure of
         `matplotlib.pyplot`.
-    color : {"kind", "orientation", "one", "nematic", "tetratic", "cubatic"}, optional
-        Quantity that colours the particles of a packing; "kind" by default.
+    color : {"kind", "orientation", "one", "S2", "S4", "C4"}, optional
+        Quantity that colours the particles of a packing: their kind (default), direction, or the nematic (S2), tetratic
+        (S4) or cubatic (C4) order of their neighbours.
 
     Returns
     -------
@@ -84,6 +86,7 @@ def plot(
             f"{{color}} has no effect on a {type(thing).__name__}, expected a packing; leave it out"
         )
         raise ArgumentError(msg, {"color": color})
+    require_one_of("color", color or "kind", CHOICES)
     if axes is None:
         import matplotlib.pyplot as plt  # noqa: PLC0415 - not needed where axes are given
 

@@ -300,3 +300,8 @@ def test_results_of_a_file_that_was_changed_are_left_out(tmp_path):
         packing = js.load(tmp_path / "packing.h5")
     assert not packing.results
     assert packing.pressure == 0
+
+
+def test_a_colour_that_is_none_is_refused(run):
+    with pytest.raises(ValueError, match=r"^color is 'blue', expected one of kind, S2"):
+        js.plot(run.packing(), Figure().add_subplot(), color="blue")
