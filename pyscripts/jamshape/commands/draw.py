@@ -21,7 +21,7 @@ import numpy as np
 
 from jamshape.checks import ArgumentError, Range, require_in, require_other_file, require_stated
 from jamshape.command import parser_of, report, typed
-from jamshape.drawing.colors import CHOICES
+from jamshape.drawing.colors import CHOICES, NAMED, color_of
 from jamshape.drawing.movie import MOVIES
 from jamshape.drawing.packing import Look
 from jamshape.drawing.pictures import draw_pictures, read_picture, save_pictures
@@ -48,7 +48,10 @@ def options_of() -> ArgumentParser:
     parser.add_argument("--every", type=int, help="show every n-th frame in a movie (1)")
     parser.add_argument("--fps", type=float, help="frames per second of a movie (10)")
     parser.add_argument(
-        "--color", choices=CHOICES, default="kind", help="quantity shown by colour (%(default)s)"
+        "--color",
+        choices=(*CHOICES, *NAMED),
+        default="kind",
+        help="quantity shown by colour (%(default)s)",
     )
     sides = "points of a side-to-side contact; auto: as in the file, or else 2 (auto)"
     parser.add_argument("--sides", choices=("auto", "1", "2"), help=sides)
@@ -75,7 +78,7 @@ def _look(options: Namespace, *, in_space: bool) -> Look:
         said = f"{{{name}}} has no effect in the plane, expected a packing in space; leave it out"
         raise ArgumentError(said, {name: value})
     asked = {"height": _HEIGHT, "turn": _TURN, "level": 0} | asked
-    return Look(options.color, asked["height"], asked["turn"], asked["level"])
+    return Look(color_of(options.color), asked["height"], asked["turn"], asked["level"])
 
 
 def _movie(options: Namespace) -> None:
@@ -88,7 +91,9 @@ def _movie(options: Namespace) -> None:
     meaning = {"dimension": options.dimension, "shape": options.shape}
     found = load(path, **meaning)
     shown = frames(path, **meaning) if isinstance(found, Packing) else found
-    animate(shown, options.out, color=options.color, **typed(options, "fps", "every", "dpi"))
+    animate(
+        shown, options.out, color=color_of(options.color), **typed(options, "fps", "every", "dpi")
+    )
     report({"out": options.out, "frames": len(range(0, len(shown), options.every or 1))})
 
 
@@ -112,7 +117,7 @@ def main(options: Namespace) -> None:
     for name, value in typed(options, "height", "turn").items():
         require_in(f"--{name}", value, _ANGLE)
     sides = int(options.sides) if options.sides in {"1", "2"} else None
-    how = -1 if options.frame is None else options.frame, sides, options.color
+    how = -1 if options.frame is None else options.frame, sides, color_of(options.color)
     wanted = Wanted(options.dimension, options.shape)
     pictures = [read_picture(path, *how, wanted) for path in options.files]
     look = _look(options, in_space=any(row.report["dimension"] == 3 for row in pictures))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from jamshape.arrays import BoolArray, FloatArray
+from jamshape.checks import require_one_of
 from jamshape.contacts import Contacts
 from jamshape.drawing.kinds import kinds_of
 from jamshape.drawing.styles import GREEN, KINDS, RATTLER, RED, YELLOW
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
 
 CHOICES = ("kind", "S2", "S4", "C4", "orientation", "one")
 
+NAMED = {"nematic": "S2", "tetratic": "S4", "cubatic": "C4"}
+"""Words for the orders."""
+
 ORDER = {
     "S2": r"local nematic order $S_2^\mathrm{loc}$",
     "S4": r"local tetratic order $S_4^\mathrm{loc}$",
@@ -28,6 +32,13 @@ _UNKNOWN = 0.75  # grey
 _LEAST = 0.1  # end of a scale of order
 _SMALLEST, _LARGEST = KINDS[0], KINDS[1]
 _ALONE = KINDS[1]  # for particles of a single kind
+
+
+def color_of(word: str) -> str:
+    """Return the quantity that a word names, one of `CHOICES`; raises ValueError for others."""
+    color = NAMED.get(word, word)
+    require_one_of("color", color, (*CHOICES, *NAMED))
+    return color
 
 
 class Coloring(NamedTuple):

@@ -16,12 +16,11 @@ from jamshape.checks import (
     Range,
     require_in,
     require_no_effect,
-    require_one_of,
     require_stated,
     said,
 )
 from jamshape.contacts import Contacts
-from jamshape.drawing.colors import CHOICES
+from jamshape.drawing.colors import color_of
 from jamshape.drawing.movie import Movie, Shot, require_movie
 from jamshape.drawing.packing import Look
 from jamshape.drawing.text import scientific
@@ -116,7 +115,7 @@ def animate(
         require_movie(Path(file))  # before any work
     require_in("fps", fps, _FPS)
     require_stated(dpi=dpi)
-    require_one_of("color", color or "kind", CHOICES)
+    color = color_of(color or "kind")
     shots: Any
     if isinstance(thing, Modes):
         require_no_effect("mode", mode, every=every)
@@ -127,7 +126,7 @@ def animate(
                 text = f"{{{name}}} has no effect on a {type(thing).__name__}, expected modes; leave it out"
                 raise ArgumentError(text, {name: value})
         shots = _Frames(thing, 1 if every is None else every)
-    movie = Movie(shots, Look(color or "kind"), fps, dpi)
+    movie = Movie(shots, Look(color), fps, dpi)
     if file is None:
         return movie
     movie.save(Path(file))

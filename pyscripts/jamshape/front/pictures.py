@@ -8,8 +8,8 @@ import io
 from typing import TYPE_CHECKING, Any
 
 from jamshape.arguments import ArgumentTypeError, checked
-from jamshape.checks import ArgumentError, require_one_of, said
-from jamshape.drawing.colors import CHOICES
+from jamshape.checks import ArgumentError, said
+from jamshape.drawing.colors import color_of
 from jamshape.drawing.ladder import Rungs, draw_rungs
 from jamshape.drawing.modes import draw_density
 from jamshape.drawing.packing import Look, add_legend, colorings, draw_packing
@@ -57,7 +57,7 @@ def plot(
         `matplotlib.pyplot`.
     color : {"kind", "orientation", "one", "S2", "S4", "C4"}, optional
         Quantity that colours the particles of a packing: their kind (default), direction, or the nematic (S2), tetratic
-        (S4) or cubatic (C4) order of their neighbours.
+        (S4) or cubatic (C4) order of their neighbours, also by these words.
 
     Returns
     -------
@@ -86,13 +86,13 @@ def plot(
             f"{{color}} has no effect on a {type(thing).__name__}, expected a packing; leave it out"
         )
         raise ArgumentError(msg, {"color": color})
-    require_one_of("color", color or "kind", CHOICES)
+    color = color_of(color or "kind")
     if axes is None:
         import matplotlib.pyplot as plt  # noqa: PLC0415 - not needed where axes are given
 
         axes = plt.figure(figsize=_size(thing), layout="constrained").add_subplot()
     _require_plane(axes)
-    _draw(thing, axes, color or "kind")
+    _draw(thing, axes, color)
     return axes
 
 

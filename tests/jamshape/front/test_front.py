@@ -302,6 +302,14 @@ def test_results_of_a_file_that_was_changed_are_left_out(tmp_path):
     assert packing.pressure == 0
 
 
+def test_words_of_orders_colour_by_them(run):
+    drawn = [Figure().add_subplot() for _ in range(2)]
+    for axes, color in zip(drawn, ("nematic", "S2"), strict=True):
+        js.plot(run.packing(), axes, color=color)
+    one, other = ([c.get_facecolor() for c in axes.collections] for axes in drawn)
+    assert all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
+
+
 def test_a_colour_that_is_none_is_refused(run):
     with pytest.raises(ValueError, match=r"^color is 'blue', expected one of kind, S2"):
         js.plot(run.packing(), Figure().add_subplot(), color="blue")
