@@ -86,7 +86,7 @@ class Compatibility(Record):
     def constraints(self) -> Constraints:
         """Rank of C, and number of states of self stress; the unit of rotations does not matter.
 
-        A second for some ten thousand bonds in 2D, a minute in 3D.
+        Takes long for tens of thousands of bonds in 3D.
         """
         root, units = (scipy.sparse.diags(x) for x in (np.sqrt(self.stiffness), self.units))
         return constraints((root @ self.matrix @ units).tocsr(), self.residual)

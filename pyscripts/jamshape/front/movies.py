@@ -192,7 +192,7 @@ def _swinging(modes: Modes, mode: int | None, amplitude: float | None) -> list[S
     require_in("mode", mode, Range(-len(modes), len(modes) - 1, "a mode", whole=True))
     size = _USUAL if amplitude is None else amplitude
     require_in("amplitude", size, _AMPLITUDE)
-    shift, turn = modes.table.coordinates.motion(vectors[:, mode])
+    shift, turn = modes.coordinates.motion(vectors[:, mode])
     reach = np.sqrt((shift**2).sum(axis=1))
     reach += np.sqrt((turn**2).sum(axis=1)) * packing.outer_radius
     scale = size * float(packing.inner_radius.min()) / float(reach.max())

@@ -138,7 +138,7 @@ class FixedBox:
 
 
 Goal = Target | FixedBox
-"""What a search for a strict minimum returns to."""
+"""Goal to which a search for a strict minimum returns."""
 
 
 def _stiffness(landscape: Landscape) -> float:

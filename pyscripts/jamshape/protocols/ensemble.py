@@ -46,21 +46,20 @@ def sample(recipe: Recipe, out: Path | None) -> Sample:
     """Make a packing, into a file if one is given, and return its numbers."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        if out is None:
-            known = made(recipe).results
-        elif is_done(out):
-            require_same(out, recipe)
-            known = read_attributes(out)
-        else:
-            make(recipe, out)
-            known = read_attributes(out)
-    found = {name: float(known.get(name, math.nan)) for name in _NUMBERS}
+        known = made(recipe).results if out is None else _kept(recipe, out)
+    found: Sample = {name: float(known.get(name, math.nan)) for name in _NUMBERS}
+    found |= {"outcome": known["outcome"], "reached": is_reached(known)}
     why = shortfall(known)
-    return (
-        found
-        | {"outcome": known["outcome"], "reached": is_reached(known)}
-        | ({"why": why} if why else {})
-    )
+    return found | ({"why": why} if why else {})
+
+
+def _kept(recipe: Recipe, out: Path) -> Mapping[str, Any]:
+    """Make a packing in a file, unless it is there, and return its attributes."""
+    if is_done(out):
+        require_same(out, recipe)
+    else:
+        make(recipe, out)
+    return read_attributes(out)
 
 
 def file_of(folder: Path, recipe: Recipe) -> Path:

@@ -68,7 +68,7 @@ def bring(landscape: Landscape, state: State, goal: Target) -> Minimum:
 def _opened(landscape: Landscape, state: State, goal: Target) -> State:
     """Open the box until u is about u0; sliding rods would make small steps slow.
 
-    Uses `measures.packing_summary.energy_onset`: sqrt(u) is linear in phi, d sqrt(u)/dphi = (p + u) / (2 phi sqrt(u)).
+    As in `measures.packing_summary.energy_onset`, sqrt(u) is linear in phi: d sqrt(u)/dphi = (p + u) / (2 phi sqrt(u)).
     """
     evaluation, volume, D = landscape.evaluate(state), state.volume, state.dimension
     u, p = evaluation.energy / volume, -evaluation.strain_gradient / (D * volume)

@@ -259,13 +259,12 @@ class Minimising:
     """Minimisation at a fixed box, in parts."""
 
     def __init__(self, making: Making, checkpoint: Checkpoint | None) -> None:
-        self._making, self._found, self._parts = making, None, 0
+        self._making, self._parts = making, 0
+        self._found: Minimum | None = None
         self._history, self._state = History(), making.state
         if checkpoint is not None:
             self._history = History.of(checkpoint["history"])
             self._state, self._parts = checkpoint["state"], checkpoint["parts"]
-
-    _found: Minimum | None
 
     @property
     def done(self) -> bool:

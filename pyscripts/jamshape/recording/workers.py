@@ -128,6 +128,8 @@ class Workers:
                     _send(process.stdin, (self._function, self._tasks[number]))
                     result, failure = pickle.load(process.stdout)  # type: ignore[arg-type]
                 except (EOFError, OSError, pickle.UnpicklingError):
+                    with suppress(OSError):  # of what was not sent
+                        process.stdin.close()  # type: ignore[union-attr]
                     code = process.wait()
                     if not self._ended.is_set():
                         self._done.put(

@@ -12,7 +12,7 @@ from jamshape.vibration.table import ModeTable
 TOLD = ("low", "middle", "high")  # bands
 
 PREFIX = "packing_"
-"""Of the attributes that modes copy from the file of their packing."""
+"""Prefix of the attributes that modes copy from the file of their packing."""
 
 
 class Key(NamedTuple):
