@@ -88,7 +88,9 @@ def order_of(found: Contacts, name: str) -> FloatArray:
     names = NAMES[found.packing.dimension]
     if name not in names:
         D = found.packing.dimension
-        msg = f"particles are in {D}D and coloured by {name}, expected {' or '.join(names)} there"
+        words = {symbol: f"{symbol} ({word})" for word, symbol in NAMED.items()}
+        expected = " or ".join(words[symbol] for symbol in names)
+        msg = f"particles are in {D}D and coloured by {words[name]}, expected {expected} there"
         raise ValueError(msg)
     return local_order(found.packing, found.network.pairs)[name]
 
