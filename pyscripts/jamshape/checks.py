@@ -183,6 +183,7 @@ RANGES = {
     "phi_start": Range(1e-9, 0.999, "a packing fraction"),
     "phi_end": Range(1e-6, 2.0, "a packing fraction"),
     "p_end": Range(1e-12, 1.0, "a pressure"),
+    "pressure": Range(1e-12, 1.0, "a pressure"),
     "tolerance": Range(1e-14, 1.0, "an error"),
     "integration_tolerance": Range(1e-14, 1.0, "an error"),
     "accuracy": Range(1e-15, 0.5, "an error"),

@@ -205,6 +205,33 @@ class Landscape:
         hessian = self._summed(blocks, places)
         return Curvature(hessian, coupling, strain_hessian)
 
+    def strained(self, state: State, strains: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return second derivatives of the energy by coordinates and by k strains of the box.
+
+        Parameters
+        ----------
+        state : State
+        strains : (k, D, D) array of float64
+            Changes of r_i - r_j, linear in it, at fixed orientations.
+
+        Returns
+        -------
+        (k, n) and (k, k) arrays of float64
+            Derivatives of the gradient by each strain, and by two of them.
+        """
+        found = self.derivatives(state, extended=True)
+        blocks, places = contracted(found), self._places(found)
+        D = self.particles.dimension
+        moved = np.einsum("kab,cb->kca", strains, found["separation"])
+        by_strain = np.einsum("cij,kcj->kci", blocks[:, :, :D], moved)
+        used = places.column >= 0
+        pulled = [
+            np.bincount(places.column[used], (one[:, places.variable] * places.scale)[used], self.size)
+            for one in by_strain
+        ]
+        own = np.einsum("kci,lci->kl", by_strain[:, :, :D], moved)
+        return np.reshape(pulled, (len(strains), self.size)).astype(np.float64), own.astype(np.float64)
+
     def rattlers(self, state: State) -> BoolArray:
         """(N,) whether the particle is a rattler (`jamshape.contacts.find_rattlers`)."""
         packing = state.packing(self.particles)

@@ -108,7 +108,7 @@ class Target:
 
     def strain_above_jamming(self, landscape: Landscape) -> float:
         """Estimate the strain of the box between jamming and u0."""
-        return math.sqrt(self.u0 / _stiffness(landscape))
+        return strain_at(landscape, self.u0)
 
 
 @dataclass(frozen=True)
@@ -139,6 +139,11 @@ class FixedBox:
 
 Goal = Target | FixedBox
 """Goal to which a search for a strict minimum returns."""
+
+
+def strain_at(landscape: Landscape, u: float) -> float:
+    """Estimate the strain of the box between jamming and an energy density."""
+    return math.sqrt(u / _stiffness(landscape))
 
 
 def _stiffness(landscape: Landscape) -> float:

@@ -1,0 +1,447 @@
+"""Minima of the enthalpy: packings at a pressure, an energy or a packing fraction in boxes that yield.
+
+Unknowns are the particles and the components of an upper triangular strain of the box that are free. At a minimum of
+H = U + p V over these the pressure tensor is P = p 1 in these components. The box takes Newton steps of the enthalpy
+of the relaxed packing, whose second derivative is K - X^T M^-1 X (Dagois-Bohy et al., Phys. Rev. Lett. 109, 095703
+(2012), for the bordered Hessian); particles follow by linear response and are then minimised. At a fixed volume the same
+holds for the strains that keep it. Independent of shape and dimension.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jamshape.arrays import FloatArray
+from jamshape.checks import ArgumentError, require_stated
+from jamshape.contacts import CrossingError
+from jamshape.landscape import Landscape
+from jamshape.landscape.local_energy_model import LocalEnergyModel
+from jamshape.landscape.newton import least_shift
+from jamshape.minima.descent import History, Minimum, Outcome, Stop
+from jamshape.minima.minimise import minimise
+from jamshape.minima.target import TargetError, strain_at
+from jamshape.packing import State
+
+FIXED, ISOTROPIC, FREE = "fixed", "isotropic", "free"
+COMPONENTS = {2: ("xx", "yy", "xy"), 3: ("xx", "yy", "zz", "yz", "xz", "xy")}
+"""Components of the strain of a box, by dimension."""
+
+_MOST_STEPS = 400  # of the box
+_ROUGH = 1e-6  # residual of minima on the way
+_NEAR = 0.1  # relative distance of the stress to its target below which minima have the full tolerance
+_ACCURACY = 1e-9  # of the linear response
+_FALLEN = 1e-2  # fraction of the expected energy below which the packing has come apart
+_LONGEST = 5e-3  # largest strain in a step
+_CLOSING = 1e-5  # first strain of an unjammed packing; doubled each time
+_REACH, _LEAST_REACH = 0.5, 1e-7  # strain in a step over that from jamming
+_SMALL_REACH = 0.02  # below which a packing that comes apart is unstable
+_SLIDING = 1e-5  # residual that sliding leaves; see `target`
+_FIRST_LEVEL = 1e-4  # pressure at which unstable boxes yield, in k_e / length^D: there they need few steps
+_LOWER, _MOST_LIFTS, _MOST_LIFTED = 0.1, 8, 100.0  # factor to the next pressure; most times, and factor, that it is raised
+_SETTLED = 1e-2  # stress error at which it is reduced
+_ROUNDING = 1e-12  # relative, of the enthalpy
+_VOLUME = 1e-15  # relative error of the volume
+
+
+def strains_of(box: str, dimension: int) -> FloatArray:
+    """Return a basis of the strains in which a box yields.
+
+    Parameters
+    ----------
+    box : str
+        ``isotropic``, ``free``, or components such as ``xx yy xy``.
+    dimension : int
+
+    Returns
+    -------
+    (k, D, D) array of float64
+        Upper triangular. Only the first one changes the volume; if none does, it is 0.
+
+    Raises
+    ------
+    ArgumentError
+        If the box is none of these.
+
+    Examples
+    --------
+    >>> strains_of("xx xy", 2)[:, 0]
+    array([[1., 0.],
+           [0., 1.]])
+    """
+    names = COMPONENTS[dimension]
+    words = names if box == FREE else tuple(box.split())
+    if box == ISOTROPIC:
+        return np.eye(dimension)[None]
+    if not words or len(set(words)) < len(words) or not set(words) <= set(names):
+        said = "{box:name} is " + repr(box) + ", expected isotropic, free or components such as "
+        raise ArgumentError(f"{said}{names[0]!r} or {' '.join(names)!r}", {"box": box})
+    axes = [k for k in range(dimension) if "xyz"[k] * 2 in words]
+    found = [np.zeros((dimension, dimension))]
+    found[0][axes, axes] = 1.0
+    for n in range(1, len(axes)):  # differences
+        found.append(np.zeros((dimension, dimension)))
+        found[-1][axes[: n + 1], axes[: n + 1]] = [*[1.0] * n, -n]
+        found[-1] /= math.sqrt(n * (n + 1))
+    for a, b in (("xyz".index(w[0]), "xyz".index(w[1])) for w in words if w[0] != w[1]):
+        found.append(np.zeros((dimension, dimension)))
+        found[-1][a, b] = 1.0
+    return np.array(found)
+
+
+@dataclass(frozen=True)
+class Yielding:
+    """Goal of a minimisation in a box that yields: one of pressure, u0 and phi.
+
+    Parameters
+    ----------
+    box
+        ``isotropic``, ``free``, or components such as ``xx yy xy``.
+    pressure, u0
+        [energy / length^D]
+    phi
+        Packing fraction.
+    accuracy
+        Largest difference of the pressure tensor to its target over the pressure, and of u over u0.
+    tolerance
+        Largest residual of the particles.
+
+    Raises
+    ------
+    ValueError
+        If not exactly one target is given, or a number is out of its range.
+    """
+
+    box: str = ISOTROPIC
+    pressure: float | None = None
+    u0: float | None = None
+    phi: float | None = None
+    accuracy: float = 1e-8
+    tolerance: float = 1e-8
+
+    def __post_init__(self) -> None:
+        given = {name: getattr(self, name) for name in ("pressure", "u0", "phi")}
+        given = {name: value for name, value in given.items() if value is not None}
+        if len(given) != 1:
+            found = " and ".join(given) or "none"
+            msg = f"targets are {found}, expected one of pressure, u0 and phi"
+            raise ValueError(msg)
+        require_stated(**given, accuracy=self.accuracy, tolerance=self.tolerance)
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Settings as attributes of a file, where names without `target` are of measurements."""
+        names = {"pressure": "target_pressure", "u0": "u0", "phi": "target_phi"}
+        told = {new: value for old, new in names.items() if (value := getattr(self, old)) is not None}
+        return told | {"box_yields": self.box, "accuracy": self.accuracy, "tolerance": self.tolerance}
+
+    @property
+    def aim(self) -> str:
+        """The target in words."""
+        if self.pressure is not None:
+            return f"pressure = {self.pressure:g}"
+        return f"u0 = {self.u0:g}" if self.u0 is not None else f"phi = {self.phi:g}"
+
+    def require(self, dimension: int) -> None:
+        """Refuse a box that the target cannot have; raises ArgumentError."""
+        strains = strains_of(self.box, dimension)
+        if not strains[0].any():
+            name = next(n for n in ("pressure", "u0", "phi") if getattr(self, n) is not None)
+            said = "{box} keeps the volume, which {" + name + "} needs to change, expected a component such as xx as well"
+            raise ArgumentError(said, {"box": self.box, name: getattr(self, name)})
+
+    def find(self, landscape: Landscape, start: State) -> Minimum:
+        """Lead a state to the goal; errors as `advance`."""
+        at = Settling(start)
+        while not at.done:
+            advance(landscape, at, self)
+        assert at.present is not None
+        return at.present
+
+
+@dataclass(eq=False)
+class Settling:
+    """A packing whose box yields, between two minimisations, with all that is needed to resume it.
+
+    Parameters
+    ----------
+    state
+        State to minimise first.
+    present
+        Its last minimum.
+    reach
+        Largest strain of the next step, over the strain from jamming.
+    closing
+        Strain of the next compression of an unjammed state.
+    level
+        Pressure to reach first, where the target is smaller; falls as the stress gets there.
+    n_lifts
+        Times that it was raised.
+    n_steps
+        Steps of the box so far.
+    stress_error
+        Largest difference of the stress to its target, over the pressure.
+    tolerance
+        Residual of the particles that suffices; grows where only sliding is left.
+    done
+        Whether the goal is reached, or as near as can be.
+    """
+
+    state: State
+    present: Minimum | None = None
+    reach: float = _REACH
+    closing: float = _CLOSING
+    level: float = math.inf
+    n_lifts: int = 0
+    n_steps: int = 0
+    stress_error: float = math.inf
+    tolerance: float = 0.0
+    done: bool = False
+    history: History = field(default_factory=History)
+
+
+class _Posed(NamedTuple):
+    """Newton's equations of the box at a minimum of the particles."""
+
+    strains: FloatArray
+    """(k, D, D) strains to choose from."""
+    slope: FloatArray
+    """(k,) derivative of the enthalpy, with particles following."""
+    curvature: FloatArray
+    """(k, k) its second derivative; not symmetric where the target stress is not isotropic."""
+    response: FloatArray
+    """(k + 1, n) motion of the particles by each strain, and by their remaining forces."""
+
+
+def _pressures(landscape: Landscape, at: Settling, goal: Yielding) -> tuple[float, float]:
+    """Return the mean pressure in the components that may change the volume, and the one to reach."""
+    present = at.present
+    assert present is not None
+    tensor, normal = landscape.stress(present.state), strains_of(goal.box, present.state.dimension)[0]
+    pressure = float((tensor * normal).sum() / normal.sum()) if normal.any() else float(np.trace(tensor) / len(tensor))
+    if goal.phi is not None:
+        return pressure, pressure
+    if goal.pressure is not None:
+        return pressure, max(goal.pressure, at.level)
+    assert goal.u0 is not None
+    return pressure, max(pressure * math.sqrt(goal.u0 / present.energy_density), at.level)
+
+
+def advance(landscape: Landscape, at: Settling, goal: Yielding) -> None:
+    """Minimise the particles once, at the first box or after a step of it.
+
+    Parameters
+    ----------
+    landscape : Landscape
+    at : Settling
+        Updated.
+    goal : Yielding
+
+    Raises
+    ------
+    TargetError
+        If the goal is not reached.
+    CrossingError
+        If spines cross at the start.
+    """
+    if at.present is None:
+        at.tolerance, at.level = goal.tolerance, 0.0
+        at.present = minimise(landscape, at.state, "auto", Stop(goal.tolerance), at.history)
+        if len(strains_of(goal.box, at.state.dimension)) > 1:
+            at.level = min(_first_level(landscape), _pressures(landscape, at, goal)[0])
+    elif at.n_steps >= _MOST_STEPS:
+        _give_up(landscape, at, goal)
+    elif at.reach < _LEAST_REACH:
+        _lift(landscape, at, goal)
+    elif not _has_volume(landscape, at.present.state, goal):
+        _change_volume(landscape, at, goal)
+    elif at.present.outcome is Outcome.UNJAMMED:
+        _close(landscape, at, goal)
+    else:
+        _step(landscape, at, goal)
+    at.n_steps += 1
+    at.state = at.present.state
+    _judge(landscape, at, goal)
+
+
+def _judge(landscape: Landscape, at: Settling, goal: Yielding) -> None:
+    """Decide whether the goal is reached."""
+    present = at.present
+    assert present is not None
+    if not _has_volume(landscape, present.state, goal):
+        return
+    if present.outcome is Outcome.UNJAMMED:
+        at.done = goal.phi is not None
+        return
+    aim = _pressures(landscape, at, goal)[1]
+    at.stress_error = _stress_error(landscape, present, aim, goal)
+    if goal.phi is None and at.level == aim:
+        if at.stress_error < _SETTLED:
+            at.level *= _LOWER
+        return
+    left = present.residual.largest
+    if present.outcome is Outcome.STALLED and left < _SLIDING:
+        at.tolerance = max(at.tolerance, 1.5 * left)
+    is_balanced = left <= at.tolerance or present.outcome is Outcome.KINK
+    at.done = is_balanced and at.stress_error <= goal.accuracy and _has_energy(present, goal)
+
+
+def _stress_error(landscape: Landscape, found: Minimum, aim: float, goal: Yielding) -> float:
+    """Return the largest difference of the stress to its target in the components that yield, over the pressure."""
+    strains = strains_of(goal.box, found.state.dimension)[int(goal.phi is not None) :]
+    off = landscape.stress(found.state) - aim * np.eye(found.state.dimension)
+    return float(np.abs(np.einsum("ab,kab->k", off, strains)).max(initial=0.0)) / aim
+
+
+def _has_energy(present: Minimum, goal: Yielding) -> bool:
+    return goal.u0 is None or abs(present.energy_density / goal.u0 - 1) <= goal.accuracy
+
+
+def _volume_of(landscape: Landscape, goal: Yielding) -> float:
+    assert goal.phi is not None
+    return float(landscape.particles.measures.sum()) / goal.phi
+
+
+def _has_volume(landscape: Landscape, state: State, goal: Yielding) -> bool:
+    return goal.phi is None or abs(state.volume / _volume_of(landscape, goal) - 1) <= _VOLUME
+
+
+def _first_level(landscape: Landscape) -> float:
+    return _FIRST_LEVEL * landscape.stiffness / landscape.length**landscape.particles.dimension
+
+
+def _lift(landscape: Landscape, at: Settling, goal: Yielding) -> None:
+    """Continue at a higher pressure where contacts open and close within the smallest steps."""
+    level = max(at.level, _pressures(landscape, at, goal)[1]) / _LOWER
+    if at.n_lifts == _MOST_LIFTS or goal.phi is not None or level > _MOST_LIFTED * _first_level(landscape):
+        _give_up(landscape, at, goal)
+    at.level, at.reach, at.n_lifts = level, _REACH, at.n_lifts + 1
+
+
+def _give_up(landscape: Landscape, at: Settling, goal: Yielding) -> None:
+    assert at.present is not None
+    pressure = -at.present.evaluation.strain_gradient / (at.state.dimension * at.state.volume)
+    msg = (
+        f"after {at.n_steps} steps of the box the pressure is {pressure:.6g} and u {at.present.energy_density:.6g}, with"
+        f" stresses off by {at.stress_error:.2g} of the pressure and a residual of {at.present.residual.largest:.2g}, expected"
+        f" {goal.aim} within {goal.accuracy:g}; take another target or another start"
+    )
+    raise TargetError(msg)
+
+
+def _change_volume(landscape: Landscape, at: Settling, goal: Yielding) -> None:
+    """Strain the box towards its packing fraction by a bounded step."""
+    present = at.present
+    assert present is not None
+    normal = strains_of(goal.box, present.state.dimension)[0]
+    whole = (_volume_of(landscape, goal) / present.state.volume) ** (1 / normal.sum()) - 1
+    strain = float(np.clip(whole, -_LONGEST, _LONGEST))
+    is_last = strain == whole
+    state = present.state.deformed(np.eye(len(normal), dtype=np.longdouble) + np.longdouble(strain) * normal)
+    tolerance = goal.tolerance if is_last else max(goal.tolerance, _ROUGH)
+    at.present = minimise(landscape, state, "auto", Stop(tolerance), at.history)
+
+
+def _close(landscape: Landscape, at: Settling, goal: Yielding) -> None:
+    """Compress an unjammed packing."""
+    assert at.present is not None
+    normal = strains_of(goal.box, at.state.dimension)[0]
+    state = at.state.deformed(np.eye(len(normal), dtype=np.longdouble) - np.longdouble(at.closing) * normal)
+    at.closing, at.reach = min(2 * at.closing, _LONGEST), _REACH
+    at.present = minimise(landscape, state, "auto", Stop(_ROUGH), at.history)
+
+
+def _step(landscape: Landscape, at: Settling, goal: Yielding) -> None:
+    """Take a step of the box, and accept it if the enthalpy falls."""
+    present = at.present
+    assert present is not None
+    state, volume = present.state, present.state.volume
+    every = strains_of(goal.box, state.dimension)
+    pressure, aim = _pressures(landscape, at, goal)
+    strains = every[1:] if goal.phi is not None else every[int(not every[0].any()) :]
+    posed = _posed(landscape, present, strains, aim)
+    from_jamming = strain_at(landscape, present.energy_density)
+    largest = min(at.reach * from_jamming, _LONGEST)
+    e = _within(posed, largest)
+    matrix = _matrix(strains, e, every[0], keeps_volume=goal.phi is not None)
+    model = LocalEnergyModel(landscape, state)
+    x = -(e @ posed.response[:-1]) - posed.response[-1]
+    moved = landscape.displaced(state, model.part_within(x) * x).deformed(matrix).with_least_tilt()
+    is_near = float(np.linalg.norm(e)) < 0.999 * largest and at.stress_error < _NEAR
+    tolerance = at.tolerance if is_near else max(goal.tolerance, _ROUGH)
+    least = min(1.0, (aim / pressure) ** 2 if pressure > 0 else 1.0) * present.evaluation.energy
+    stop = Stop(tolerance, lowest=_FALLEN * least / volume)
+    try:
+        found = minimise(landscape, moved, "near", stop, at.history)
+    except CrossingError:
+        at.reach /= 4
+        return
+    if found.outcome is Outcome.UNJAMMED:  # opened too far, or, in a small step, unstable to the strain
+        if at.reach < _SMALL_REACH:
+            at.present, at.closing, at.level = found, _CLOSING, _first_level(landscape)
+        else:
+            at.reach /= 4
+        return
+    expected = float(posed.slope @ e + 0.5 * e @ posed.curvature @ e)
+    gained = found.evaluation.energy - present.evaluation.energy
+    gained += aim * volume * (float(np.prod(np.diagonal(matrix))) - 1)
+    noise = _ROUNDING * (present.evaluation.energy + abs(aim) * volume * float(np.abs(e).sum()))
+    settles = is_near and _stress_error(landscape, found, aim, goal) < 0.5 * at.stress_error
+    if gained > noise and not settles:
+        if present.residual.largest > at.tolerance:  # forces that are left make predictions wrong
+            at.present = minimise(landscape, state, "near", Stop(at.tolerance), at.history)
+            return
+        at.reach = float(np.linalg.norm(e)) / from_jamming / 4
+        return
+    if gained < 0.5 * expected or is_near:
+        at.reach = min(2 * at.reach, _LONGEST / from_jamming)
+    at.present = found
+
+
+def _posed(landscape: Landscape, present: Minimum, strains: FloatArray, aim: float) -> _Posed:
+    """Set up Newton's equations for strains at a target pressure."""
+    state, volume = present.state, present.state.volume
+    newton = LocalEnergyModel(landscape, state).newton(least_shift(landscape, present.evaluation))
+    newton.prepare()
+    coupling, own = landscape.strained(state, strains)
+    gradient = present.evaluation.gradient
+    response = np.asarray(newton.solve(np.vstack([coupling, gradient]), _ACCURACY))
+    off = landscape.stress(state) - aim * np.eye(state.dimension)
+    slope = -volume * np.einsum("ab,kab->k", off, strains) - response[-1] @ coupling.T
+    traces = np.trace(strains, axis1=1, axis2=2)
+    turned = np.einsum("kab,lba->kl", strains, strains)
+    curvature = own + aim * volume * (np.outer(traces, traces) - turned)
+    return _Posed(strains, slope, curvature - coupling @ response[:-1].T, response)
+
+
+def _within(posed: _Posed, largest: float) -> FloatArray:
+    """Minimise the quadratic model of the enthalpy within a ball."""
+    values, axes = np.linalg.eigh(0.5 * (posed.curvature + posed.curvature.T))
+    along = axes.T @ posed.slope
+    low, high = max(0.0, -float(values[0])), 0.0
+
+    def at(shift: float) -> FloatArray:
+        return np.asarray(-along / np.maximum(values + shift, 1e-300))
+
+    if values[0] > 0 and np.linalg.norm(at(0.0)) <= largest:
+        return np.asarray(axes @ at(0.0))
+    high = low + float(np.linalg.norm(along)) / largest
+    for _ in range(200):
+        middle = 0.5 * (low + high)
+        if np.linalg.norm(at(middle)) > largest:
+            low = middle
+        else:
+            high = middle
+    return np.asarray(axes @ at(high))
+
+
+def _matrix(strains: FloatArray, e: FloatArray, normal: FloatArray, *, keeps_volume: bool) -> Any:
+    """Return the deformation (D, D) of a strain, in long double."""
+    found = np.eye(len(normal), dtype=np.longdouble) + np.einsum("k,kab->ab", e.astype(np.longdouble), strains)
+    if keeps_volume:
+        scale = np.prod(np.diagonal(found)) ** (-1 / np.longdouble(normal.sum()))
+        found = found @ np.diag(np.where(np.diagonal(normal) > 0, scale, 1))
+    return found
