@@ -86,7 +86,7 @@ def warn_unless_reached(known: Mapping[str, Any], stacklevel: int = 2) -> None:
 
 def _is_balanced(known: Mapping[str, Any]) -> bool:
     outcome = known["outcome"]
-    if outcome == _UNJAMMED and known.get("protocol") == MINIMISED:
+    if outcome == _UNJAMMED and (known.get("protocol") == MINIMISED or "target_phi" in known):
         return True  # nothing touches, so that forces vanish
     return outcome in AT_REST or (outcome == _SLIDING and _residual(known) <= _tolerance(known))
 

@@ -27,6 +27,9 @@ def make_packing(
     dimension: int | None = None,
     seed: int | None = None,
     u0: float | None = None,
+    pressure: float | None = None,
+    phi: float | None = None,
+    box: str | None = None,
     accuracy: float | None = None,
     tolerance: float | None = None,
     phi_start: float | None = None,
@@ -63,8 +66,17 @@ def make_packing(
         Target elastic energy over the area (volume) of the box, a measure of the distance to jamming;
         1e-15 in 2D and 1e-12 in 3D by default. 0, the default of equal steps, keeps the first jammed
         packing as it is.
+    pressure : float, [energy / length^D], optional
+        Target pressure, instead of u0: the packing is a minimum of the enthalpy U + p V.
+    phi : float, optional
+        Target packing fraction, instead of u0; the packing jams first and is then strained there, and below jamming
+        nothing touches.
+    box : str, optional
+        How the box yields: "isotropic" (default), "free", or components such as "xx yy xy". In components that yield the
+        pressure tensor becomes p 1, with no shear stress (Dagois-Bohy et al., Phys. Rev. Lett. 109, 095703 (2012)).
     accuracy : float, optional
-        Relative error of the energy, (u - u0) / u0; 1e-7 by default.
+        Relative error of the energy, (u - u0) / u0; 1e-7 by default. With a pressure or a box that yields otherwise, also
+        that of the pressure tensor, 1e-8.
     tolerance : float, optional
         Largest net force and torque on a particle over the mean force of a bond; 1e-8 by default, or
         1e-4 for equal steps.
@@ -142,7 +154,7 @@ def make_packing(
     True
     """
     recipe = recipe_for(
-        particles, dimension, seed, n=n, u0=u0, accuracy=accuracy, tolerance=tolerance,
+        particles, dimension, seed, n=n, u0=u0, pressure=pressure, phi=phi, box=box, accuracy=accuracy, tolerance=tolerance,
         protocol=protocol, phi_start=phi_start, kappa=kappa, p_end=p_end, phi_end=phi_end,
         phi_thermal=phi_thermal, n_sweeps=n_sweeps, delta_phi=delta_phi, start=start,
         search=search, minimiser=minimiser, strict=strict,

@@ -2,26 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from jamshape.arguments import checked
-from jamshape.checks import RANGES, require_stated
+from jamshape.checks import RANGES, require_in, require_no_effect, require_stated, require_with
 from jamshape.front.making import made_or_kept
 from jamshape.front.packing import Packing
 from jamshape.front.reading import Held, packing_of
 from jamshape.front.starts import digest, told_of
-from jamshape.minima.target import FixedBox
-from jamshape.protocols.recipe import Given, Recipe
+from jamshape.minima.boxes import FIXED
+from jamshape.minima.target import FixedBox, Target
+from jamshape.protocols.defaults import aim_of
+from jamshape.protocols.recipe import Aim, Given, Recipe
 from jamshape.shapes.particles import Particles
+
+
+_EVALUATIONS = 200_000
 
 
 @checked
 def minimise(
     packing: Held,
     *,
+    u0: float | None = None,
+    pressure: float | None = None,
+    phi: float | None = None,
+    box: str | None = None,
+    accuracy: float | None = None,
     tolerance: float = 1e-8,
-    minimiser: str = "auto",
-    evaluations: int = 200_000,
+    minimiser: str | None = None,
+    evaluations: int | None = None,
     strict: bool = False,
     threads: int = 1,
     file: str | Path | None = None,
@@ -29,19 +40,21 @@ def minimise(
     seconds: float | None = None,
     progress: bool = True,
 ) -> Packing:
-    """Minimise the energy of a packing at its box, under its own law.
+    """Minimise the energy of a packing at its box, or lead it to a pressure, an energy or a packing fraction.
 
     Parameters
     ----------
     packing : Packing or path
         Any state, or a file that `load` reads, of which the last frame is taken.
+    u0, pressure, phi, box, accuracy
+        Target, and how the box yields, as in `make_packing`; without a target the box is "fixed".
     tolerance : float
         Largest net force and torque on a particle over the mean force of a bond; torques are divided by the length A or a.
-    minimiser : {"auto", "near", "newton", "cg_marschall"}
-        L-BFGS followed by Newton's method (auto), Newton's method first, for a state near its minimum (near), or alone
+    minimiser : {"auto", "near", "newton", "cg_marschall"}, optional
+        At a fixed box: L-BFGS followed by Newton's method (auto), Newton's method first, for a state near its minimum (near), or alone
         (newton), or the conjugate gradients in appendix A of Marschall & Teitel 2018.
-    evaluations : int
-        Largest number of evaluations of all forces.
+    evaluations : int, optional
+        Largest number of evaluations of all forces at a fixed box; 200000 by default.
     strict : bool
         Continue at the same box, along floppy modes, until no mode has an eigenvalue below minus its error bound;
         ``n_negative`` of the results counts those that do.
@@ -82,16 +95,36 @@ def minimise(
     >>> rested.results["outcome"], discs.u > 0, rested.u
     ('unjammed', True, 0.0)
     """
-    require_stated(tolerance=tolerance, evaluations=evaluations)
+    most = _EVALUATIONS if evaluations is None else evaluations
+    require_stated(tolerance=tolerance, evaluations=most)
     state = packing_of(packing)
-    recipe = _recipe(
-        state,
-        Given(state, _made_from(state), FixedBox(tolerance, minimiser), evaluations),
-        strict=strict,
-    )
+    goal: FixedBox | Aim = FixedBox(tolerance, minimiser or "auto")
+    targets = {"u0": u0, "pressure": pressure, "phi": phi}
+    if box not in {None, FIXED} or any(value is not None for value in targets.values()):
+        goal = _aim(targets, box, accuracy, tolerance)
+        named = next(name for name, value in targets.items() if value is not None)
+        require_no_effect(named, targets[named], minimiser=minimiser, evaluations=evaluations)
+    elif accuracy is not None:
+        require_with("u0", None, accuracy=accuracy)
+    recipe = _recipe(state, Given(state, _made_from(state), goal, most), strict=strict)
     return made_or_kept(
         recipe, file, threads=threads, again=again, seconds=seconds, progress=progress
     )
+
+
+def _aim(
+    targets: Mapping[str, float | None], box: str | None, accuracy: float | None, tolerance: float
+) -> Aim:
+    """Return the target, with the box that yields to it."""
+    u0 = targets["u0"]
+    if u0 is not None:
+        require_in("u0", u0, RANGES["u0"]._replace(also=()))
+    get, given = {"u0": u0, "tolerance": tolerance}, {"u0": u0, "accuracy": accuracy}
+    aim = aim_of(get, given, pressure=targets["pressure"], phi=targets["phi"], box=box)
+    if aim is not None:
+        return aim
+    assert u0 is not None
+    return Target(u0, 1e-7 if accuracy is None else accuracy, tolerance)
 
 
 def _made_from(state: Packing) -> dict[str, object]:

@@ -219,7 +219,7 @@ class Landscape:
         (k, n) and (k, k) arrays of float64
             Derivatives of the gradient by each strain, and by two of them.
         """
-        found = self.derivatives(state, extended=True)
+        found = self.derivatives(state)  # of the contacts that doubles see, as in factors of the Hessian
         blocks, places = contracted(found), self._places(found)
         D = self.particles.dimension
         moved = np.einsum("kab,cb->kca", strains, found["separation"])

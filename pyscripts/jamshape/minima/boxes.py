@@ -21,9 +21,9 @@ from jamshape.contacts import CrossingError
 from jamshape.landscape import Landscape
 from jamshape.landscape.local_energy_model import LocalEnergyModel
 from jamshape.landscape.newton import least_shift
-from jamshape.minima.descent import History, Minimum, Outcome, Stop
+from jamshape.minima.descent import History, Minimum, Outcome, Stop, rounding_floor
 from jamshape.minima.minimise import minimise
-from jamshape.minima.target import TargetError, strain_at
+from jamshape.minima.target import Target, TargetError, require_reachable, strain_at
 from jamshape.packing import State
 
 FIXED, ISOTROPIC, FREE = "fixed", "isotropic", "free"
@@ -32,15 +32,17 @@ COMPONENTS = {2: ("xx", "yy", "xy"), 3: ("xx", "yy", "zz", "yz", "xz", "xy")}
 
 _MOST_STEPS = 400  # of the box
 _ROUGH = 1e-6  # residual of minima on the way
+_TIGHT, _FLOORS = 1e-12, 10.0  # residual near the end, where soft modes move stresses; at least so many roundings
 _NEAR = 0.1  # relative distance of the stress to its target below which minima have the full tolerance
 _ACCURACY = 1e-9  # of the linear response
+_SHIFT = 1e-13  # least shift of the Hessian, in k_e / length^2, so that translations do not take up rounding
 _FALLEN = 1e-2  # fraction of the expected energy below which the packing has come apart
 _LONGEST = 5e-3  # largest strain in a step
 _CLOSING = 1e-5  # first strain of an unjammed packing; doubled each time
 _REACH, _LEAST_REACH = 0.5, 1e-7  # strain in a step over that from jamming
 _SMALL_REACH = 0.02  # below which a packing that comes apart is unstable
 _SLIDING = 1e-5  # residual that sliding leaves; see `target`
-_FIRST_LEVEL = 1e-4  # pressure at which unstable boxes yield, in k_e / length^D: there they need few steps
+_FIRST_LEVEL = 1e-3  # of the pressure, in k_e / length^D
 _LOWER, _MOST_LIFTS, _MOST_LIFTED = 0.1, 8, 100.0  # factor to the next pressure; most times, and factor, that it is raised
 _SETTLED = 1e-2  # stress error at which it is reduced
 _ROUNDING = 1e-12  # relative, of the enthalpy
@@ -145,9 +147,11 @@ class Yielding:
             return f"pressure = {self.pressure:g}"
         return f"u0 = {self.u0:g}" if self.u0 is not None else f"phi = {self.phi:g}"
 
-    def require(self, dimension: int) -> None:
-        """Refuse a box that the target cannot have; raises ArgumentError."""
-        strains = strains_of(self.box, dimension)
+    def require(self, landscape: Landscape) -> None:
+        """Refuse a box that the target cannot have, or a target out of reach; raises ValueError."""
+        if self.u0 is not None:
+            require_reachable(landscape, Target(self.u0))
+        strains = strains_of(self.box, landscape.particles.dimension)
         if not strains[0].any():
             name = next(n for n in ("pressure", "u0", "phi") if getattr(self, n) is not None)
             said = "{box} keeps the volume, which {" + name + "} needs to change, expected a component such as xx as well"
@@ -177,7 +181,8 @@ class Settling:
     closing
         Strain of the next compression of an unjammed state.
     level
-        Pressure to reach first, where the target is smaller; falls as the stress gets there.
+        Pressure to reach first, where the target is smaller, [energy / length^D]; falls as the stress gets there. By
+        default that of the start.
     n_lifts
         Times that it was raised.
     n_steps
@@ -194,7 +199,7 @@ class Settling:
     present: Minimum | None = None
     reach: float = _REACH
     closing: float = _CLOSING
-    level: float = math.inf
+    level: float | None = None
     n_lifts: int = 0
     n_steps: int = 0
     stress_error: float = math.inf
@@ -248,10 +253,12 @@ def advance(landscape: Landscape, at: Settling, goal: Yielding) -> None:
         If spines cross at the start.
     """
     if at.present is None:
-        at.tolerance, at.level = goal.tolerance, 0.0
+        at.tolerance = goal.tolerance
         at.present = minimise(landscape, at.state, "auto", Stop(goal.tolerance), at.history)
+        given, at.level = at.level, 0.0
         if len(strains_of(goal.box, at.state.dimension)) > 1:
-            at.level = min(_first_level(landscape), _pressures(landscape, at, goal)[0])
+            present = _pressures(landscape, at, goal)[0]
+            at.level = min(first_level(landscape), present) if given is None else given
     elif at.n_steps >= _MOST_STEPS:
         _give_up(landscape, at, goal)
     elif at.reach < _LEAST_REACH:
@@ -274,7 +281,7 @@ def _judge(landscape: Landscape, at: Settling, goal: Yielding) -> None:
     if not _has_volume(landscape, present.state, goal):
         return
     if present.outcome is Outcome.UNJAMMED:
-        at.done = goal.phi is not None
+        at.done, at.stress_error = goal.phi is not None, 0.0
         return
     aim = _pressures(landscape, at, goal)[1]
     at.stress_error = _stress_error(landscape, present, aim, goal)
@@ -309,14 +316,15 @@ def _has_volume(landscape: Landscape, state: State, goal: Yielding) -> bool:
     return goal.phi is None or abs(state.volume / _volume_of(landscape, goal) - 1) <= _VOLUME
 
 
-def _first_level(landscape: Landscape) -> float:
+def first_level(landscape: Landscape) -> float:
+    """Return a pressure at which unstable boxes yield in few steps, [energy / length^D]."""
     return _FIRST_LEVEL * landscape.stiffness / landscape.length**landscape.particles.dimension
 
 
 def _lift(landscape: Landscape, at: Settling, goal: Yielding) -> None:
     """Continue at a higher pressure where contacts open and close within the smallest steps."""
     level = max(at.level, _pressures(landscape, at, goal)[1]) / _LOWER
-    if at.n_lifts == _MOST_LIFTS or goal.phi is not None or level > _MOST_LIFTED * _first_level(landscape):
+    if at.n_lifts == _MOST_LIFTS or goal.phi is not None or level > _MOST_LIFTED * first_level(landscape):
         _give_up(landscape, at, goal)
     at.level, at.reach, at.n_lifts = level, _REACH, at.n_lifts + 1
 
@@ -371,7 +379,9 @@ def _step(landscape: Landscape, at: Settling, goal: Yielding) -> None:
     x = -(e @ posed.response[:-1]) - posed.response[-1]
     moved = landscape.displaced(state, model.part_within(x) * x).deformed(matrix).with_least_tilt()
     is_near = float(np.linalg.norm(e)) < 0.999 * largest and at.stress_error < _NEAR
-    tolerance = at.tolerance if is_near else max(goal.tolerance, _ROUGH)
+    floor = _FLOORS * rounding_floor(present.evaluation, landscape)
+    tight = at.tolerance if at.tolerance > goal.tolerance else min(goal.tolerance, max(_TIGHT, floor))
+    tolerance = tight if is_near else max(goal.tolerance, _ROUGH)
     least = min(1.0, (aim / pressure) ** 2 if pressure > 0 else 1.0) * present.evaluation.energy
     stop = Stop(tolerance, lowest=_FALLEN * least / volume)
     try:
@@ -381,7 +391,7 @@ def _step(landscape: Landscape, at: Settling, goal: Yielding) -> None:
         return
     if found.outcome is Outcome.UNJAMMED:  # opened too far, or, in a small step, unstable to the strain
         if at.reach < _SMALL_REACH:
-            at.present, at.closing, at.level = found, _CLOSING, _first_level(landscape)
+            at.present, at.closing, at.level = found, _CLOSING, first_level(landscape)
         else:
             at.reach /= 4
         return
@@ -404,10 +414,13 @@ def _step(landscape: Landscape, at: Settling, goal: Yielding) -> None:
 def _posed(landscape: Landscape, present: Minimum, strains: FloatArray, aim: float) -> _Posed:
     """Set up Newton's equations for strains at a target pressure."""
     state, volume = present.state, present.state.volume
-    newton = LocalEnergyModel(landscape, state).newton(least_shift(landscape, present.evaluation))
+    least = _SHIFT * landscape.stiffness / landscape.length**2
+    shift = max(least, least_shift(landscape, present.evaluation))
+    newton = LocalEnergyModel(landscape, state).newton(shift)
     newton.prepare()
     coupling, own = landscape.strained(state, strains)
-    gradient = present.evaluation.gradient
+    # Smaller forces are rounding, which soft modes would amplify.
+    gradient = present.evaluation.gradient * (present.residual.largest > _ROUGH / 10)
     response = np.asarray(newton.solve(np.vstack([coupling, gradient]), _ACCURACY))
     off = landscape.stress(state) - aim * np.eye(state.dimension)
     slope = -volume * np.einsum("ab,kab->k", off, strains) - response[-1] @ coupling.T

@@ -6,6 +6,7 @@ import collections
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from jamshape.checks import require_one_of, require_positive
 from jamshape.landscape import Landscape
@@ -94,6 +95,15 @@ class Target:
         numbers = ("u0", "accuracy", "tolerance", "step")
         require_positive(**{name: getattr(self, name) for name in numbers})
 
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Settings as attributes."""
+        return dict(vars(self))
+
+    def require(self, landscape: Landscape) -> None:
+        """Refuse a goal out of reach; raises ValueError."""
+        require_reachable(landscape, self)
+
     def is_met(self, u: float) -> bool:
         """Whether an energy density equals u0 to the accuracy."""
         return abs(u - self.u0) <= self.accuracy * self.u0
@@ -121,6 +131,14 @@ class FixedBox:
     def __post_init__(self) -> None:
         require_positive(tolerance=self.tolerance)
         require_one_of("minimiser", self.method, METHODS)
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Settings as attributes."""
+        return dict(vars(self))
+
+    def require(self, landscape: Landscape) -> None:
+        """Refuse nothing."""
 
     def is_met(self, u: float) -> bool:
         """Accept every energy."""

@@ -8,9 +8,17 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from jamshape.checks import RANGES, ArgumentError, require_one_of, require_stated, require_with
+from jamshape.checks import (
+    RANGES,
+    ArgumentError,
+    require_no_effect,
+    require_one_of,
+    require_stated,
+    require_with,
+)
 from jamshape.files.vocabulary import ATHERMAL, COMPRESSED, THERMAL, protocol_named
 from jamshape.minima import METHODS
+from jamshape.minima.boxes import FIXED, ISOTROPIC, Yielding
 from jamshape.minima.target import Target
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.quasistatic import Quasistatic
@@ -37,6 +45,8 @@ _ROUGH = 1e-2  # residual that suffices before the search for an energy
 
 # Energy tolerance over the squared step, [energy]: a step adds ten to a hundred times as much to a jammed packing.
 _LOOSE = 2.5e-3
+
+_IN_BETWEEN = 1e-8  # energy density near which compression hands over, where the target is not an energy
 
 _LAMBDA = 1e-6  # initial one of bisection (Marschall & Teitel 2018, Sec. III C)
 
@@ -161,8 +171,8 @@ def recipe_for(
     protocol : str or int, optional
         One of `PROTOCOLS`, "quasistatic" by default; 1 and 2 are those of Yuan et al. 2019.
     **given
-        Settings of `PROTOCOLS` by name, None for defaults; and `strict`, whether to continue to a minimum
-        without negative eigenvalues.
+        Settings of `PROTOCOLS` by name, None for defaults; `strict`, whether to continue to a minimum without
+        negative eigenvalues; and `pressure`, `phi` and `box` of `Yielding`.
 
     Returns
     -------
@@ -183,6 +193,7 @@ def recipe_for(
     1024
     """
     strict = bool(given.pop("strict", None))
+    other = {name: given.pop(name, None) for name in ("pressure", "phi", "box")}
     source = None if given.get("start") is None else Source.read(Path(given["start"]))
     if source is not None:
         source.require(particles, n=given.get("n"), dimension=dimension, seed=seed)
@@ -192,12 +203,56 @@ def recipe_for(
     require_one_of("protocol", name, PROTOCOLS)
     usual = PROTOCOLS[name]
     get = usual.defaults(dimension) | _allowed(given, usual, name)
+    aim = aim_of(get, given, **other)
+    if isinstance(aim, Yielding):
+        get |= {"u0": aim.u0 or _IN_BETWEEN, "accuracy": aim.accuracy}
     require_with("u0", get["u0"] or None, accuracy=given.get("accuracy"))
     if source is not None:
         get |= _of_source(source, given)
     how, target = usual.compose(get)
+    if isinstance(aim, Yielding):
+        target = aim
     numbers = (get["n"], dimension, 1 if seed is None else seed, get["phi_start"])
     return Recipe(particles, *numbers, how, target, strict=strict)
+
+
+def aim_of(
+    get: Values,
+    given: Values,
+    *,
+    pressure: float | None,
+    phi: float | None,
+    box: str | None,
+) -> Yielding | None:
+    """Return the target of a box that yields; None for an energy in an isotropic box, or none at all.
+
+    Parameters
+    ----------
+    get
+        u0 and tolerance.
+    given
+        Those that were typed, and the accuracy.
+    pressure, phi, box
+        As typed; see `Yielding`.
+
+    Raises
+    ------
+    ValueError
+        If settings contradict each other or are out of their ranges.
+    """
+    require_no_effect("pressure", pressure, u0=given.get("u0"), phi=phi)
+    require_no_effect("phi", phi, u0=given.get("u0"))
+    if box == FIXED:
+        said = "{box} keeps the packing fraction of the start, expected isotropic, free or components such as 'xx yy xy'"
+        raise ArgumentError(said, {"box": box})
+    if pressure is None and phi is None and box in {None, ISOTROPIC}:
+        return None
+    u0 = get["u0"] or None if pressure is None and phi is None else None
+    if (pressure, phi, u0) == (None, None, None):
+        said = "{box} needs a target, expected {pressure:name}, {u0:name} or {phi:name} as well"
+        raise ArgumentError(said, {"box": box, "pressure": None, "u0": None, "phi": None})
+    accuracy = 1e-8 if given.get("accuracy") is None else given["accuracy"]
+    return Yielding(box or ISOTROPIC, pressure, u0, phi, accuracy, get["tolerance"])
 
 
 def _placed(particles: Particles | None, dimension: int | None) -> tuple[Particles, int]:

@@ -31,7 +31,8 @@ from jamshape.measures.onset import OnsetFit, fit_onset
 from jamshape.measures.packing_summary import summary_of, with_results, write_minimum
 from jamshape.minima import History, Minimum, Outcome
 from jamshape.minima.checkpoints import minimum_of, told_minimum
-from jamshape.minima.target import require_reachable
+from jamshape.minima.boxes import Yielding
+from jamshape.minima.target import FixedBox
 from jamshape.packing import Packing, State
 from jamshape.protocols import approach
 from jamshape.protocols.choosing import Choosing, frame_of
@@ -51,6 +52,7 @@ from jamshape.protocols.stages import (
     Minimising,
     Retrying,
     Searching,
+    Settling,
     Stage,
     Strengthening,
     Sweeping,
@@ -209,7 +211,7 @@ def _compression(recipe: Recipe) -> Plan:
     def start() -> Packing:
         packing = recipe.start()
         if recipe.target:
-            require_reachable(Landscape(packing), recipe.target)
+            recipe.target.require(Landscape(packing))
         return packing
 
     told, way = recipe.before_target(), recipe.way
@@ -260,8 +262,9 @@ class Pipeline:
     def _stages(self) -> list[Begin]:
         """List the stages; the last one follows from the minimum."""
         recipe, way = self._recipe, self._recipe.way
+        finding: Begin = Settling if isinstance(recipe.goal, Yielding) else Searching
         if isinstance(way, Given):
-            return [Minimising, self._last]
+            return [Minimising if isinstance(way.goal, FixedBox) else finding, self._last]
         found: list[Begin] = []
         if isinstance(way, Steps) and way.thermal:
             found += [partial(Compressing, phi=way.thermal.phi), Sweeping]
@@ -270,7 +273,7 @@ class Pipeline:
         if isinstance(way, Compressed):
             assert self._source
             found.append(partial(Choosing, file=self._source))
-        return found + [Searching] * bool(recipe.target) + [self._last] * bool(recipe.target)
+        return found + [finding, self._last] * bool(recipe.target)
 
     def _last(self, making: Making, checkpoint: Checkpoint | None) -> Stage | None:
         """Begin a strict search or a second attempt, where there is to be one."""

@@ -14,7 +14,8 @@ from jamshape.arrays import FloatArray
 from jamshape.checks import ArgumentError, require_one_of, require_rising, require_stated
 from jamshape.files.h5md import read_packing
 from jamshape.files.vocabulary import ATHERMAL, COMPRESSED, MINIMISED, THERMAL
-from jamshape.minima.target import FixedBox, Goal, Target, bisection, extrapolation
+from jamshape.minima.boxes import Yielding
+from jamshape.minima.target import FixedBox, Target, bisection, extrapolation
 from jamshape.packing import Packing
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.quasistatic import Quasistatic
@@ -23,6 +24,9 @@ from jamshape.shapes.particles import Particles
 
 SEARCHES = {"extrapolation": extrapolation, "bisection": bisection}
 """Searches for a target energy: ours, and that of Marschall & Teitel 2018, Sec. III C, as written."""
+
+Aim = Target | Yielding
+"""Target energy, or another target with a box that yields."""
 
 # The paper's slowest rate; slower ones would not end in LAMMPS in reasonable time.
 _SLOWEST = 1e-10
@@ -62,7 +66,7 @@ class Way(Protocol):
     def start(self, recipe: Recipe) -> Packing:
         """Make the random start."""
 
-    def attributes(self, target: Target | None) -> dict[str, Any]:
+    def attributes(self, target: Aim | None) -> dict[str, Any]:
         """Return its identifying attributes."""
 
     def require(self, recipe: Recipe) -> None:
@@ -93,18 +97,18 @@ class Steps:
         make = random_packing if recipe.dimension == 2 else dilute_packing
         return make(recipe.n, recipe.phi_start, recipe.seed, recipe.particles, recipe.dimension)
 
-    def compression(self, target: Target | None) -> Quasistatic:
+    def compression(self, target: Aim | None) -> Quasistatic:
         """Return the settings of the compression; before a target energy it need not be close to the tolerance."""
         return replace(self.quasistatic, closeness=math.inf) if target else self.quasistatic
 
-    def attributes(self, target: Target | None) -> dict[str, Any]:
+    def attributes(self, target: Aim | None) -> dict[str, Any]:
         """Return its identifying attributes."""
         found: dict[str, Any] = {"protocol": THERMAL if self.thermal else ATHERMAL}
         if self.thermal:
             found |= {"phi_thermal": self.thermal.phi, "n_sweeps": self.thermal.n_sweeps}
         return found | self.steps(target)
 
-    def steps(self, target: Target | None) -> dict[str, Any]:
+    def steps(self, target: Aim | None) -> dict[str, Any]:
         """Return the identifying attributes of its compression."""
         settings = vars(self.compression(target))
         return {f"quasistatic_{k}": v for k, v in settings.items() if v is not None}
@@ -129,7 +133,7 @@ class Adaptive(Steps):
         Settings of the compression; its `coarse` limits the growth of steps.
     """
 
-    def attributes(self, target: Target | None) -> dict[str, Any]:
+    def attributes(self, target: Aim | None) -> dict[str, Any]:
         """Return its identifying attributes."""
         return {"protocol": "quasistatic"} | self.steps(target)
 
@@ -154,7 +158,7 @@ class Dynamics:
             recipe.n, recipe.phi_start, recipe.seed, recipe.particles, recipe.dimension
         )
 
-    def attributes(self, target: Target | None) -> dict[str, Any]:
+    def attributes(self, target: Aim | None) -> dict[str, Any]:
         """Return its identifying attributes."""
         del target
         found = {f"approach_{k}": v for k, v in vars(self.approach).items()}
@@ -217,7 +221,7 @@ class Compressed:
             recipe.n, recipe.phi_start, recipe.seed, recipe.particles, recipe.dimension
         )
 
-    def attributes(self, target: Target | None) -> dict[str, Any]:
+    def attributes(self, target: Aim | None) -> dict[str, Any]:
         """Return its identifying attributes."""
         del target
         start = "" if self.source is None else self.source.name
@@ -235,7 +239,7 @@ class Compressed:
 
 @dataclass(frozen=True)
 class Given:
-    """No way at all: a state of one's own, to be minimised at its box.
+    """No way at all: a state of one's own, to be minimised at its box or led to a target.
 
     Parameters
     ----------
@@ -244,27 +248,27 @@ class Given:
     made_from
         Attributes that describe it.
     goal
-        Tolerance and minimiser.
+        Fixed box with its minimiser, or a target.
     evaluations
-        Largest number of evaluations of all forces.
+        Largest number of evaluations of all forces at a fixed box.
     """
 
     packing: Packing
     made_from: Mapping[str, Any]
-    goal: FixedBox
+    goal: FixedBox | Aim
     evaluations: int = 200_000
-    search: ClassVar[str] = ""
+    search: ClassVar[str] = "extrapolation"
 
     def start(self, recipe: Recipe) -> Packing:
         """Return the state."""
         del recipe
         return self.packing
 
-    def attributes(self, target: Target | None) -> dict[str, Any]:
+    def attributes(self, target: Aim | None) -> dict[str, Any]:
         """Return its identifying attributes."""
         del target
         told = {"protocol": MINIMISED, "evaluations_limit": self.evaluations}
-        return dict(self.made_from) | vars(self.goal) | told
+        return dict(self.made_from) | self.goal.settings | told
 
     def require(self, recipe: Recipe) -> None:
         """Refuse nothing."""
@@ -285,7 +289,8 @@ class Recipe:
     way
         Way from there to jamming.
     target
-        Target energy density; None for the first jammed packing of `Steps` as it is.
+        Target energy density, or another target with a box that yields; None for the first jammed packing of `Steps`
+        as it is.
     strict
         Whether to continue, at that energy, to a minimum without negative eigenvalues (`protocols.strict`).
 
@@ -309,7 +314,7 @@ class Recipe:
     seed: int = 1
     phi_start: float = 0.4
     way: Way = field(default_factory=Dynamics)
-    target: Target | None = field(default_factory=Target)
+    target: Aim | None = field(default_factory=Target)
     strict: bool = False
 
     def __post_init__(self) -> None:
@@ -318,26 +323,37 @@ class Recipe:
         if self.strict and self.goal is None:
             said = "{u0} does not work with a strict minimum, expected a positive one"
             raise ArgumentError(said, {"u0": 0})
+        if isinstance(self.goal, Yielding):
+            self._require_yielding(self.goal)
         self.way.require(self)
+
+    def _require_yielding(self, goal: Yielding) -> None:
+        """Refuse what has no effect beside a box that yields."""
+        if self.strict:
+            said = "{strict} works at a given energy or box, found {box}; leave one of them out"
+            raise ArgumentError(said, {"strict": True, "box": goal.box})
+        if self.way.search != "extrapolation":
+            said = "{search} finds an energy in an isotropic box, found {box}; leave one of them out"
+            raise ArgumentError(said, {"search": self.way.search, "box": goal.box})
 
     def start(self) -> Packing:
         """Make the random start; errors as in `random_start.random_packing`."""
         return self.way.start(self)
 
     @property
-    def goal(self) -> Goal | None:
-        """Target energy, or fixed box; None for the first jammed packing."""
+    def goal(self) -> FixedBox | Aim | None:
+        """Target, or fixed box; None for the first jammed packing."""
         return self.way.goal if isinstance(self.way, Given) else self.target
 
     @property
     def is_searched(self) -> bool:
-        """Whether the search for the energy is ours, not a published one."""
-        return self.target is not None and self.way.search == "extrapolation"
+        """Whether there is a search for an energy, and it is ours, not a published one."""
+        return isinstance(self.goal, Target) and self.way.search == "extrapolation"
 
     def attributes(self) -> dict[str, Any]:
         """Return its identifying attributes."""
         strict = {"strict": True} if self.strict else {}
-        return self.before_target() | (vars(self.target) if self.target else {}) | strict
+        return self.before_target() | (self.target.settings if self.target else {}) | strict
 
     def before_target(self) -> dict[str, Any]:
         """Return the attributes that identify the stages before the energy search."""

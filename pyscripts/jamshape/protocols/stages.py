@@ -12,21 +12,20 @@ from typing import Any, Protocol
 
 from jamshape.files.checkpoint import Checkpoint
 from jamshape.landscape import Landscape
-from jamshape.minima import History, Minimum, Outcome, Stop, minimise
+from jamshape.minima import History, Minimum, Outcome, Stop, boxes, minimise
 from jamshape.minima.checkpoints import minimum_of, search_of, told_minimum, told_search
 from jamshape.minima.target import (
-    Goal,
+    FixedBox,
     Search,
     Target,
     TargetError,
     bisect,
     extrapolate,
-    require_reachable,
 )
 from jamshape.packing import State
 from jamshape.protocols import quasistatic, retry, strict, thermal
 from jamshape.protocols.quasistatic import QuasistaticRun
-from jamshape.protocols.recipe import Given, Recipe, Steps
+from jamshape.protocols.recipe import Aim, Given, Recipe, Steps
 from jamshape.protocols.retry import Retry
 from jamshape.protocols.strict import StrictSearch
 from jamshape.protocols.thermal import Thermal, without_overlaps
@@ -70,12 +69,12 @@ class Making:
     @property
     def target(self) -> Target:
         """Target energy."""
-        assert self.recipe.target is not None
-        return self.recipe.target
+        assert isinstance(self.recipe.goal, Target)
+        return self.recipe.goal
 
     @property
-    def goal(self) -> Goal:
-        """Target energy, or fixed box."""
+    def goal(self) -> FixedBox | Aim:
+        """Target, or fixed box."""
         goal = self.recipe.goal
         assert goal is not None
         return goal
@@ -119,7 +118,7 @@ class Compressing:
         self._protocol = way.compression(making.recipe.target)
         if checkpoint is None:
             if making.recipe.target:
-                require_reachable(making.landscape, making.target)
+                making.recipe.target.require(making.landscape)
             self._run = QuasistaticRun.of(making.landscape, making.state, self._protocol)
         else:
             history = History.of(checkpoint.pop("history"))
@@ -200,7 +199,7 @@ class Searching:
         self._before, self._u = making.landscape.evaluations, math.nan
         self._advance = _ADVANCES[making.recipe.way.search]
         if checkpoint is None:
-            require_reachable(making.landscape, making.target)
+            making.target.require(making.landscape)
             self._search = Search(making.state, making.target.step)
         else:
             self._n, self._before = checkpoint["n"], checkpoint["before"]
@@ -255,6 +254,57 @@ def _where(search: Search, target: Target, last: float) -> str:
     return f"{text}, about {math.ceil((now - aim) / (before - now))} more of it"
 
 
+class Settling:
+    """Search for a target in a box that yields."""
+
+    def __init__(self, making: Making, checkpoint: Checkpoint | None) -> None:
+        self._making, self._before = making, making.landscape.evaluations
+        if checkpoint is None:
+            self._goal.require(making.landscape)
+            level = None if isinstance(making.recipe.way, Given) else boxes.first_level(making.landscape)
+            self._at = boxes.Settling(making.state, level=level)
+        else:
+            self._before = checkpoint.pop("before")
+            history = History.of(checkpoint.pop("history"))
+            present = minimum_of(checkpoint.pop("present", None), history)
+            self._at = boxes.Settling(**checkpoint, present=present, history=history)
+
+    @property
+    def _goal(self) -> boxes.Yielding:
+        goal = self._making.goal
+        assert isinstance(goal, boxes.Yielding)
+        return goal
+
+    @property
+    def done(self) -> bool:
+        """Whether the goal is reached."""
+        return self._at.done
+
+    def advance(self) -> Told:
+        """Minimise once."""
+        at, making = self._at, self._making
+        boxes.advance(making.landscape, at, self._goal)
+        u, residual = at.history.energy_density[-1], at.history.residual[-1]
+        text = f"u {u:.2e}, stress off by {at.stress_error:.1e}, residual {residual:.1e}, step {at.n_steps} of the box"
+        return making.told(f"box yields to {self._goal.aim}", text, at.state)
+
+    def checkpoint(self) -> Checkpoint:
+        """Return the state of the box and its minimum."""
+        at = self._at
+        minimum = {"present": told_minimum(at.present), "history": at.history.told()}
+        return vars(at) | minimum | {"before": self._before}
+
+    def end(self) -> None:
+        """Hand on the packing."""
+        making = self._making
+        making.minimum, making.state = self._at.present, self._at.state
+        making.attributes |= {
+            "stress_error": self._at.stress_error,
+            "box_steps": self._at.n_steps,
+            "box_evaluations": making.landscape.evaluations - self._before,
+        }
+
+
 class Minimising:
     """Minimisation at a fixed box, in parts."""
 
@@ -276,6 +326,7 @@ class Minimising:
         making = self._making
         goal, way = making.goal, making.recipe.way
         assert isinstance(way, Given)
+        assert isinstance(goal, FixedBox)
         left = way.evaluations - self._parts * EVALUATIONS
         stop = Stop(goal.tolerance, evaluations=min(left, EVALUATIONS))
         found = minimise(making.landscape, self._state, goal.method, stop, self._history)
@@ -319,6 +370,7 @@ class Strengthening:
     def advance(self) -> Told:
         """Take a step, or check a candidate."""
         search, making = self._search, self._making
+        assert not isinstance(making.goal, boxes.Yielding)  # refused by the recipe
         strict.advance(making.landscape, search, making.goal)
         return making.told("search for a strict minimum", str(search), search.minimum.state)
 
