@@ -181,7 +181,8 @@ def _ensemble(table: EnsembleFile, axes: Axes, color: str) -> None:
 def _ladder(run: LadderFile, axes: Axes, color: str) -> None:
     del color
     rungs = Rungs(run.values, run["z"], run.opened, run.closed)
-    draw_rungs(axes, rungs, system_of(run.about, *read_style(run.file)))
+    label = {"u0": "energy density $u$", "pressure": "pressure $p$"}[run.parameter]
+    draw_rungs(axes, rungs, system_of(run.about, *read_style(run.file)), label)
 
 
 def _modes(modes: Modes, axes: Axes, color: str) -> None:

@@ -507,7 +507,7 @@ class LadderFile(Recorded):
 
     @property
     def parameter(self) -> str:
-        """Name of the control parameter, ``u0``."""
+        """Name of the control parameter, ``u0`` or ``pressure``."""
         return str(self.about["ladder_parameter"])
 
     @property
@@ -605,7 +605,7 @@ class LadderFile(Recorded):
         return f"<Ladder of {self._who()}: {done} of {asked} values to {end}{self._where()}>"
 
 
-_OBSERVABLE_OF = {"u0": "u"}
+_OBSERVABLE_OF = {"u0": "u", "pressure": "pressure"}
 """Observable of a control parameter."""
 
 

@@ -158,7 +158,8 @@ class Yielding:
             raise ArgumentError(said, {"box": self.box, name: getattr(self, name)})
 
     def find(self, landscape: Landscape, start: State) -> Minimum:
-        """Lead a state to the goal; errors as `advance`."""
+        """Lead a state to the goal; errors as `advance` and `require`."""
+        self.require(landscape)
         at = Settling(start)
         while not at.done:
             advance(landscape, at, self)
