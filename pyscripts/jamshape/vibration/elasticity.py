@@ -125,11 +125,18 @@ def moduli(
         simple_shear,
         pressure,
         *table.tensors(columns, reasons),
-        softest_of(BorderedMatrix.of(matrix)).eigenvalue,
+        _bordered(matrix),
         n_floppy=int(known.is_floppy.sum()),
         n_unsettled=int((response.is_unsettled & ~known.is_floppy).sum()),
         n_negative=int((known.sign[known.is_firm] < 0).sum()),
     )
+
+
+def _bordered(matrix: DynamicalMatrix) -> Eigenvalue:
+    """Find the smallest eigenvalue of the bordered Hessian; NaN in a state that is not at a minimum."""
+    if matrix.residual.largest > LARGEST_RESIDUAL:
+        return Eigenvalue(np.nan, np.inf)
+    return softest_of(BorderedMatrix.of(matrix)).eigenvalue
 
 
 def _strains(D: int) -> FloatArray:
