@@ -18,7 +18,7 @@ from jamshape.checks import (
 )
 from jamshape.files.vocabulary import ATHERMAL, COMPRESSED, THERMAL, protocol_named
 from jamshape.minima import METHODS
-from jamshape.minima.boxes import FIXED, ISOTROPIC, Yielding
+from jamshape.minima.boxes import FIXED, FREE, ISOTROPIC, Yielding
 from jamshape.minima.target import Target
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.quasistatic import Quasistatic
@@ -172,7 +172,7 @@ def recipe_for(
         One of `PROTOCOLS`, "quasistatic" by default; 1 and 2 are those of Yuan et al. 2019.
     **given
         Settings of `PROTOCOLS` by name, None for defaults; `strict`, whether to continue to a minimum without
-        negative eigenvalues; and `pressure`, `phi` and `box` of `Yielding`.
+        negative eigenvalues; `pressure`, `phi` and `box` of `Yielding`; and `stable_to_shear`.
 
     Returns
     -------
@@ -192,8 +192,9 @@ def recipe_for(
     >>> recipe_for(Particles.of(alpha=4.0), protocol="marschall-2018").n
     1024
     """
-    strict = bool(given.pop("strict", None))
+    strict, stable = (bool(given.pop(name, None)) for name in ("strict", "stable_to_shear"))
     other = {name: given.pop(name, None) for name in ("pressure", "phi", "box")}
+    other["box"] = FREE if stable and other["box"] is None else other["box"]
     source = None if given.get("start") is None else Source.read(Path(given["start"]))
     if source is not None:
         source.require(particles, n=given.get("n"), dimension=dimension, seed=seed)
@@ -213,7 +214,7 @@ def recipe_for(
     if isinstance(aim, Yielding):
         target = aim
     numbers = (get["n"], dimension, 1 if seed is None else seed, get["phi_start"])
-    return Recipe(particles, *numbers, how, target, strict=strict)
+    return Recipe(particles, *numbers, how, target, strict=strict, stable_to_shear=stable)
 
 
 def aim_of(
