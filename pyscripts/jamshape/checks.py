@@ -176,6 +176,7 @@ RANGES = {
     "cycles": Range(1, _COUNT, "cycles", whole=True),
     "pure_strain": Range(1e-12, 3.0, "a strain of pure shear"),
     "strain_step": Range(1e-12, 0.1, "a step of the strain"),
+    "stress_step": Range(1e-14, 1.0, "a step of the stress"),
     "strain_end": Range(1e-12, 1e6, "a strain"),
     "hold_pressure": Range(1e-12, 1.0, "a pressure", also=(0.0,)),
     "phi": Range(1e-6, 2.0, "a packing fraction"),

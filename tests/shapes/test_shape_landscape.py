@@ -133,7 +133,9 @@ def test_second_derivatives_by_every_strain_are_slopes(packing):
         return -there.volume * np.einsum("ab,kab->k", landscape.stress(there) @ deformed, strains)
 
     for strain, row, column in zip(strains, coupling, own, strict=True):
-        gradient = partial(lambda s, strain: landscape.evaluate(at(s, strain)).gradient, strain=strain)
+        gradient = partial(
+            lambda s, strain: landscape.evaluate(at(s, strain)).gradient, strain=strain
+        )
         assert_is_slope(row, gradient, h, np.abs(coupling).max())
         assert_is_slope(column, partial(slopes, strain=strain), h, np.abs(own).max())
 

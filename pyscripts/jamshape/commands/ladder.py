@@ -1,5 +1,4 @@
-"""Take a packing of any shape through energies or pressures, each state from the one before, and list the contacts that
-change.
+"""Take a packing of any shape through energies or pressures, and list the contacts that change from state to state.
 
     jamshape ladder packing.h5 --u0 1e-6 1e-8 1e-10 --out ladder.h5
     jamshape ladder packing.h5 --pressure 1e-3 1e-4 1e-5 --box free --out ladder.h5
@@ -32,11 +31,15 @@ _STATE = ("u", "phi", "pressure", "z", "rattlers", "residual")
 def options_of() -> ArgumentParser:
     """Make the parser."""
     parser = parser_for(ladder, __doc__)
-    within = "list each change between two values whose relative distance is at most this, by bisection"
+    within = (
+        "list each change between two values whose relative distance is at most this, by bisection"
+    )
     parser.add_argument("--within", type=float, help=within)
     back = "take the packing back over each change, to see if it returns"
     parser.add_argument("--step-back", action="store_true", help=back)
-    parser.add_argument("--plot", type=Path, help="figure of z and of the changes against the values")
+    parser.add_argument(
+        "--plot", type=Path, help="figure of z and of the changes against the values"
+    )
     return parser
 
 

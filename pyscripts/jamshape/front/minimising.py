@@ -17,7 +17,6 @@ from jamshape.protocols.defaults import aim_of
 from jamshape.protocols.recipe import Aim, Given, Recipe
 from jamshape.shapes.particles import Particles
 
-
 _EVALUATIONS = 200_000
 
 
@@ -137,7 +136,7 @@ def _made_from(state: Packing) -> dict[str, object]:
     return told_of(state) | {"start": name, "start_digest": digest(state)}
 
 
-def _recipe(state: Packing, way: Given, strict: bool, stable_to_shear: bool) -> Recipe:  # noqa: FBT001
+def _recipe(state: Packing, way: Given, strict: bool, stable_to_shear: bool) -> Recipe:
     particles = Particles.given(state.shape, state.diameters, state.exponent, state.species)
     low, high = RANGES["phi_start"].low, RANGES["phi_start"].high
     phi = min(max(state.phi, low), high)

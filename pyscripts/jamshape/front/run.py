@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -369,6 +369,13 @@ class CyclicShearFile(Recorded):
         return f"<Cyclic shear of {self._who()} at {start}{end}{self._where()}>"
 
 
+class YieldStress(NamedTuple):
+    """A yield stress with its error, [energy / length^D]."""
+
+    value: float
+    error: float
+
+
 class QuasistaticShearFile(Recorded):
     """A quasistatic shear in its H5MD file; parameters as in `Recorded`.
 
@@ -427,6 +434,9 @@ class QuasistaticShearFile(Recorded):
             Whether to find out if changes are reversible.
         """
         how = self._how
+        if how.stress_step and (within is not None or step_back):
+            msg = "the run raises the stress, expected one that raises the strain for changes within a distance; leave it out"
+            raise ValueError(msg)
 
         def bring(start: At, value: float) -> PackingLike:
             at, landscape = start.packing, Landscape(start.packing)
@@ -465,6 +475,17 @@ class QuasistaticShearFile(Recorded):
                 " try a smaller {step:name} or another {seed:name}"
             )
             warnings.warn(NotReachedWarning(said, {"step": None, "seed": None}), stacklevel=3)
+
+    @property
+    def yield_stress(self) -> YieldStress | None:
+        """Shear stress at which the packing begins to flow; None where strains are given, or none was reached.
+
+        Half a step away from the largest stress that it resisted, and from the smallest that it did not.
+        """
+        step = self._how.stress_step
+        if not (step and self.about.get("shear_flows")):
+            return None
+        return YieldStress((len(self["stress"]) - 1.5) * step, 0.5 * step)
 
     def modulus(self) -> float:
         """Slope of the stress in the first step, [energy / length^D]; that of the Hessian for small steps."""

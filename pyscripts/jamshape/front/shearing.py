@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 from jamshape.arguments import checked
@@ -291,6 +290,8 @@ def quasistatic_shear(
     cycles: int | None = None,
     flow: str = "simple",
     pressure: float = 0.0,
+    box: str = "isotropic",
+    stress_step: float | None = None,
     tolerance: float = 1e-8,
     seed: int | None = None,
     start: Held | None = None,
@@ -325,6 +326,12 @@ def quasistatic_shear(
         Simple or pure shear.
     pressure : float, [energy / length^D]
         Pressure to hold; 0 holds the volume.
+    box : str
+        How the box yields to the pressure: "isotropic", or components of normal stresses to hold, such as "yy".
+    stress_step : float, [energy / length^D], optional
+        Raise the shear stress by this in each step, instead of the strain, until the box shears to `strain`, where the
+        packing counts as flowing; ``run.yield_stress`` is then known. With a pressure all normal stresses are held, or
+        those of `box`.
     tolerance : float
         Largest net force and torque of a particle over the mean bond force.
     seed : int, optional
@@ -346,7 +353,7 @@ def quasistatic_shear(
     ValueError
         If a number is out of its range or has no effect, the file holds another run, or neither particles nor a start
         is given.
-    PressureError
+    TargetError
         If the pressure cannot be held.
 
     Warns
@@ -366,12 +373,17 @@ def quasistatic_shear(
     require_no_effect("amplitude", amplitude, strain=strain)
     require_with("amplitude", amplitude, cycles=cycles)
     require_stated(frames=frames, strain_step=step, tolerance=tolerance, hold_pressure=pressure)
-    require_given(strain_end=None if strain is None else abs(strain), amplitude=amplitude, cycles=cycles)  # fmt: skip
+    require_given(
+        strain_end=None if strain is None else abs(strain), amplitude=amplitude, cycles=cycles, stress_step=stress_step
+    )  # fmt: skip
     asked = Asked(n, phi, seed, dimension)
     of = Start.of(particles, asked, start, usual_phi=0.9, phi_name=_PHI_NAME)
-    how = QuasistaticShear(step, 0.5 if strain is None else strain, flow, pressure, tolerance)
-    if amplitude is not None:
-        how = replace(how, amplitude=amplitude, cycles=1 if cycles is None else cycles)
+    require_no_effect("stress_step", stress_step, amplitude=amplitude)
+    end = 0.5 if strain is None else strain
+    number = 0 if amplitude is None else 1 if cycles is None else cycles
+    how = QuasistaticShear(
+        step, end, flow, pressure, tolerance, amplitude or 0.0, number, box, stress_step or 0.0
+    )
     at = place(file, "aqs.h5")
     plan = quasistatic_driver.plan(lambda: _still(of), how, frames, of.made_from)
     recorded(at.path, plan, again=again, seconds=seconds, progress=progress)

@@ -46,7 +46,9 @@ _ROUGH = 1e-2  # residual that suffices before the search for an energy
 # Energy tolerance over the squared step, [energy]: a step adds ten to a hundred times as much to a jammed packing.
 _LOOSE = 2.5e-3
 
-_IN_BETWEEN = 1e-8  # energy density near which compression hands over, where the target is not an energy
+_IN_BETWEEN = (
+    1e-8  # energy density near which compression hands over, where the target is not an energy
+)
 
 _LAMBDA = 1e-6  # initial one of bisection (Marschall & Teitel 2018, Sec. III C)
 
@@ -211,10 +213,8 @@ def recipe_for(
     if source is not None:
         get |= _of_source(source, given)
     how, target = usual.compose(get)
-    if isinstance(aim, Yielding):
-        target = aim
     numbers = (get["n"], dimension, 1 if seed is None else seed, get["phi_start"])
-    return Recipe(particles, *numbers, how, target, strict=strict, stable_to_shear=stable)
+    return Recipe(particles, *numbers, how, aim or target, strict=strict, stable_to_shear=stable)
 
 
 def aim_of(

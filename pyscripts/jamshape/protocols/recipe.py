@@ -339,7 +339,9 @@ class Recipe:
             said = "{strict} works at a given energy or box, found {box}; leave one of them out"
             raise ArgumentError(said, {"strict": True, "box": goal.box})
         if self.way.search != "extrapolation":
-            said = "{search} finds an energy in an isotropic box, found {box}; leave one of them out"
+            said = (
+                "{search} finds an energy in an isotropic box, found {box}; leave one of them out"
+            )
             raise ArgumentError(said, {"search": self.way.search, "box": goal.box})
         if self.stable_to_shear and goal.box != FREE:
             said = "{stable_to_shear} needs a box that is free, found {box}; leave one of them out"

@@ -272,8 +272,12 @@ class Settling:
         self._tries, self._softest = 1, (math.nan, math.nan)
         if checkpoint is None:
             self._goal.require(making.landscape)
-            level = None if isinstance(making.recipe.way, Given) else boxes.first_level(making.landscape)
-            self._at = boxes.Settling(making.state, level=level)
+            level = (
+                None
+                if isinstance(making.recipe.way, Given)
+                else boxes.first_level(making.landscape)
+            )
+            self._at = boxes.Settling(making.state, first=level)
         else:
             self._before, self._tries = checkpoint.pop("before"), checkpoint.pop("tries")
             history = History.of(checkpoint.pop("history"))
@@ -313,10 +317,19 @@ class Settling:
         if found.sign >= 0 or self._tries >= _MOST_TRIES:
             return
         assert at.present is not None
-        overlap = 2 * at.present.evaluation.energy / at.present.evaluation.bond_force / at.present.evaluation.n_bonds
+        overlap = (
+            2
+            * at.present.evaluation.energy
+            / at.present.evaluation.bond_force
+            / at.present.evaluation.n_bonds
+        )
         size = _OFF_SADDLE * overlap / max(np.abs(found.motion).max(), 1e-300)
-        matrix = np.eye(at.state.dimension, dtype=np.longdouble) + np.longdouble(size) * found.strain
-        moved = landscape.displaced(at.state, size * found.motion).deformed(matrix).with_least_tilt()
+        matrix = (
+            np.eye(at.state.dimension, dtype=np.longdouble) + np.longdouble(size) * found.strain
+        )
+        moved = (
+            landscape.displaced(at.state, size * found.motion).deformed(matrix).with_least_tilt()
+        )
         self._at = boxes.Settling(moved, history=at.history)
         self._tries += 1
 

@@ -42,7 +42,9 @@ def test_a_packing_has_its_target(target):
         assert packing.u == pytest.approx(target["u0"], rel=1e-8)
     tensor = js.energy(packing).pressure_tensor
     if target.get("box") == "free":
-        np.testing.assert_allclose(tensor, packing.pressure * np.eye(2), atol=2e-8 * packing.pressure)
+        np.testing.assert_allclose(
+            tensor, packing.pressure * np.eye(2), atol=2e-8 * packing.pressure
+        )
     if target.get("box") == "yy xy":
         np.testing.assert_allclose(tensor[1], [0, 1e-5], atol=1e-12)
 
@@ -136,10 +138,14 @@ def test_commands(tmp_path):
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
         return loads(done.stdout.splitlines()[-1])
 
-    found = run("pack --alpha 0 --n 16 --pressure 1e-4 --box free --stable-to-shear --out packing.h5")
+    found = run(
+        "pack --alpha 0 --n 16 --pressure 1e-4 --box free --stable-to-shear --out packing.h5"
+    )
     assert found["pressure"] == pytest.approx(1e-4, rel=1e-8)
     assert found["tries"] == 1
     found = run("minimise packing.h5 --pressure 1e-5 --out other.h5")
     assert found["pressure"] == pytest.approx(1e-5, rel=1e-8)
     found = run("ladder packing.h5 --pressure 1e-5 1e-6 --box free --out ladder.h5")
-    assert [state["pressure"] for state in found["states"][1:]] == pytest.approx([1e-5, 1e-6], rel=1e-8)
+    assert [state["pressure"] for state in found["states"][1:]] == pytest.approx(
+        [1e-5, 1e-6], rel=1e-8
+    )
