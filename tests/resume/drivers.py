@@ -237,6 +237,17 @@ CASES = DRIVERS | {
         "quasistatic_shear", "dimers", {"step": 1e-2, "amplitude": 0.06, "cycles": 2, "frames": 3},
         {"step": 2e-2, "amplitude": 0.05, "cycles": 3},
     ),
+    "quasistatic shear at a normal stress": Case(
+        "quasistatic_shear", "dimers", {"step": 4e-3, "strain": 0.04, "pressure": 1e-3, "box": "yy", "frames": 3},
+    ),
+    "quasistatic shear by the stress": Case(
+        "quasistatic_shear", "dimers", {"stress_step": 6e-4, "strain": 0.05, "frames": 3},
+        {"stress_step": 7e-4},
+    ),
+    "ladder in pressure": Case(
+        "ladder", "dimers", {"pressure": (1e-3, 1e-4, 1e-3), "box": "free"},
+        {"pressure": (1e-3, 1e-4), "box": "isotropic"}, {}, "packing",
+    ),
     "quasistatic shear in space": Case(
         "quasistatic_shear", "bodies", {"step": 1e-2, "strain": 0.1, "frames": 3}
     ),
