@@ -190,8 +190,9 @@ def test_rounding_of_tensors_is_bounded(name):
             for part in (given.stretched, given.pushed, matrix.translations)
         )
         push = C.T * s + f
-        x = mpmath.lu_solve(C.T * C - S + Z * Z.T, -push)
-        rise = s.T * s + push.T * x
+        beside = C.T * C - S + Z * Z.T
+        columns = [mpmath.lu_solve(beside, -push[:, k]) for k in range(3)]
+        rise = s.T * s + mpmath.matrix([[(push[:, k].T * x)[0] for x in columns] for k in range(3)])
         virial = matrix.contacts["separation"].T @ matrix.contacts["force"]
         weights = pressure_terms(2).B
         for k, m in np.ndindex(3, 3):
