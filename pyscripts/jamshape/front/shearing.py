@@ -94,8 +94,8 @@ def shear(
         Bonds of a side-to-side contact of rods, 1 or 2.
     integrator : str, optional
         ``rkc2``, ``heun/adaptive`` or ``heun`` in LAMMPS, as in `compress`; or ``tr-bdf2`` or ``sdirk2``, which take
-        implicit steps in the plane, without LAMMPS, at a cost that hardly grows as the rate falls. By default ``heun`` with one bond or with `dt`, else ``tr-bdf2``
-        in the plane at rates of 3e-7 and below, and else ``rkc2``.
+        implicit steps, without LAMMPS, at a cost that hardly grows as the rate falls. By default ``heun`` with one bond or with `dt`, else ``tr-bdf2``
+        at rates of 3e-7 and below, and else ``rkc2``.
     dt : float, [time], optional
         Time step of ``heun``; 0.05 by default.
     integration_tolerance : float, optional
@@ -141,14 +141,15 @@ def shear(
     asked = Asked(n, phi, seed, dimension)
     of = Start.of(particles, asked, start, usual_phi=0.8, sides=sides, phi_name=_PHI_NAME)
     at = place(file, "shear.h5")
-    integrator = integrator or _usual(gdot, of.dimension, whole=dt is None and sides == 2)
+    integrator = integrator or _usual(gdot, whole=dt is None and sides == 2)
     if integrator in METHODS:
         require_no_effect("integrator", integrator, dt=dt, frames=frames)
         longest = min(SlowShear.largest_strain, strain / rows)
         error = integration_tolerance or _IMPLICIT_ERROR
         slow = SlowShear(gdot, strain, flow, error, largest_strain=longest, method=integrator)
-        _require_plane(of, sides)
-        plan = implicit_driver.plan(lambda: _flowing(of), slow, of.made_from | {"rows": rows})
+        _require_two_bonds(sides)
+        made_from = of.made_from | {"rows": rows, "dimension": of.dimension}
+        plan = implicit_driver.plan(lambda: _flowing(of), slow, made_from)
     else:
         settings = Shear(
             gdot=gdot, strain_end=strain, flow=flow, dt=min(0.05, 0.01 / gdot) if dt is None else dt,
@@ -402,11 +403,11 @@ def _in_rows(settings: Shear, rows: int, **given: float | None) -> Shear:
     return settings.in_steps(rows) if settings.chooses_steps else settings
 
 
-def _usual(gdot: float, dimension: int, *, whole: bool) -> str:
+def _usual(gdot: float, *, whole: bool) -> str:
     """Choose the default integrator."""
     if not whole:
         return "heun"
-    return "tr-bdf2" if dimension == 2 and gdot <= _SLOW else "rkc2"
+    return "tr-bdf2" if gdot <= _SLOW else "rkc2"
 
 
 def _require_cycle(amplitude: float, period: float, rows: int) -> None:
@@ -421,11 +422,11 @@ def _require_cycle(amplitude: float, period: float, rows: int) -> None:
         raise ArgumentError(said, {"rows": rows})
 
 
-def _require_plane(of: Start, sides: int) -> None:
-    """Refuse what implicit steps do not serve."""
-    if of.dimension != 2 or sides != 2:
+def _require_two_bonds(sides: int) -> None:
+    """Refuse the law on whose kinks implicit steps would end."""
+    if sides != 2:
         msg = (
-            f"implicit steps were requested in {of.dimension} dimensions with {sides} bonds side to side,"
-            " expected 2 and 2; choose another integrator"
+            f"implicit steps were requested with {sides} bonds side to side, expected 2; choose another"
+            " integrator"
         )
         raise ValueError(msg)
