@@ -64,8 +64,7 @@ class Turning:
 
     def settled(self, x: FloatArray, velocity: FloatArray) -> FloatArray:
         """(n,) velocity at (n,) coordinates as that at the origin of the next step, which is there."""
-        del x
-        return velocity
+        return velocity - self.excess(x, velocity)
 
     def _as_coordinates(self, rates: FloatArray) -> FloatArray:
         """Gather (N, 1 or 3) angular velocities in (n,) coordinates."""
