@@ -116,7 +116,8 @@ class LocalEnergyModel {
   virtual void remember(bool contacts) = 0;
 
   /// From now on rotations in 3D are about the axes of each body at the base, where its drag is
-  /// diagonal, instead of those of space, and factors are complete: for stages of a flow.
+  /// diagonal, instead of those of space, and factors solve equations, by iteration where they are
+  /// incomplete: for stages of a flow.
   virtual void follow_bodies() = 0;
 
   /// Sets the number of threads of sums over contacts, if there are enough: the last bits depend on
@@ -334,7 +335,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
 
   std::shared_ptr<Factors> factors(const Eigen::VectorXd &added) override
   {
-    return hessian->factors(added);
+    return along_bodies && fill() == Fill::NONE ? hessian->iterated(added) : hessian->factors(added);
   }
 
  private:
@@ -389,10 +390,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
 
   Team *team_for(std::size_t n) const { return n < MANY ? nullptr : team.get(); }
 
-  Fill fill() const
-  {
-    return D == 2 || along_bodies || shapes.size() <= FEW ? Fill::COMPLETE : Fill::NONE;
-  }
+  Fill fill() const { return D == 2 || shapes.size() <= FEW ? Fill::COMPLETE : Fill::NONE; }
 
   template <class S> LandscapeSums sums(const Displacement &at) const
   {

@@ -34,7 +34,7 @@ from jamshape.protocols.approach import compressed_start
 from jamshape.protocols.quasistatic import compressed_to
 from jamshape.shapes.particles import Particles
 
-_SLOW = 3e-7  # rate below which implicit steps are faster than explicit ones
+_SLOW = {2: 3e-7, 3: 1e-7}  # rates below which implicit steps are faster than explicit ones
 _ERROR, _IMPLICIT_ERROR = 1e-4, 1e-3  # default tolerances
 
 _FRAMES = 20
@@ -95,7 +95,7 @@ def shear(
     integrator : str, optional
         ``rkc2``, ``heun/adaptive`` or ``heun`` in LAMMPS, as in `compress`; or ``tr-bdf2`` or ``sdirk2``, which take
         implicit steps, without LAMMPS, at a cost that hardly grows as the rate falls. By default ``heun`` with one bond or with `dt`, else ``tr-bdf2``
-        at rates of 3e-7 and below, and else ``rkc2``.
+        at rates of 3e-7, in 3D 1e-7, and below, and else ``rkc2``.
     dt : float, [time], optional
         Time step of ``heun``; 0.05 by default.
     integration_tolerance : float, optional
@@ -141,7 +141,7 @@ def shear(
     asked = Asked(n, phi, seed, dimension)
     of = Start.of(particles, asked, start, usual_phi=0.8, sides=sides, phi_name=_PHI_NAME)
     at = place(file, "shear.h5")
-    integrator = integrator or _usual(gdot, whole=dt is None and sides == 2)
+    integrator = integrator or _usual(gdot, of.dimension, whole=dt is None and sides == 2)
     if integrator in METHODS:
         require_no_effect("integrator", integrator, dt=dt, frames=frames)
         longest = min(SlowShear.largest_strain, strain / rows)
@@ -403,11 +403,11 @@ def _in_rows(settings: Shear, rows: int, **given: float | None) -> Shear:
     return settings.in_steps(rows) if settings.chooses_steps else settings
 
 
-def _usual(gdot: float, *, whole: bool) -> str:
+def _usual(gdot: float, dimension: int, *, whole: bool) -> str:
     """Choose the default integrator."""
     if not whole:
         return "heun"
-    return "tr-bdf2" if gdot <= _SLOW else "rkc2"
+    return "tr-bdf2" if gdot <= _SLOW[dimension] else "rkc2"
 
 
 def _require_cycle(amplitude: float, period: float, rows: int) -> None:

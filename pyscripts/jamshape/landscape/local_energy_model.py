@@ -90,7 +90,7 @@ class LocalEnergyModel:
         Origin of coordinates.
     along_bodies : bool
         In 3D, whether rotations are about the axes of each body at the base, where its drag is diagonal, instead
-        of those of space, and factors are complete: for stages of a flow.
+        of those of space, and factors solve equations, by iteration where they are incomplete: for stages of a flow.
 
     Notes
     -----

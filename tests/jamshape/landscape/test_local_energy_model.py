@@ -7,6 +7,8 @@ from jamshape.contacts import find_contacts
 from jamshape.landscape import CrossingError, Landscape, State
 from jamshape.landscape.local_energy_model import LocalEnergyModel
 from jamshape.packing import body_axes
+from jamshape.protocols.random_start import random_packing
+from jamshape.shapes.particles import Particles
 
 STRAIN = -2e-4
 RODS = "rods of alpha 4"
@@ -263,3 +265,21 @@ def test_along_bodies_factors_follow_particles_that_have_turned():
     found = np.linalg.inv(np.array([factors.solve(unit) for unit in np.eye(landscape.size)]))
     off = np.abs(found - np.diag(large) - slopes).max() / np.abs(slopes).max()
     assert off < 0.02
+
+
+def test_many_particles_in_space_have_solutions_by_iteration():
+    """Stages need solutions, not approximations to them, though their factors are incomplete."""
+    start = random_packing(160, 0.4, 1, Particles.of("spherocylinder", alpha=1.0), 3)
+    packing, state = start, State.of(start).strained(-0.15)
+    landscape = Landscape(packing)
+    local_model = LocalEnergyModel(landscape, state, along_bodies=True)
+    still = np.zeros(landscape.size)
+    to_space = about_bodies(landscape, state)
+    hessian = to_space.T @ landscape.curvature(state).hessian.toarray() @ to_space
+    least = np.linalg.eigvalsh(hessian)[0]
+    diagonal = np.full(landscape.size, 1e-4 * np.diagonal(hessian).max() - min(least, 0.0))
+    right = np.random.default_rng(4).normal(size=landscape.size)
+    assert local_model.evaluate(still, 0.0, extended=False).n_bonds > 160
+    found = local_model.factorise(still, 0.0, diagonal).solve(right)
+    remainder = hessian @ found + diagonal * found - right
+    assert np.linalg.norm(remainder) < 1e-4 * np.linalg.norm(right)
