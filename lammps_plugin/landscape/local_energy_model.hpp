@@ -335,7 +335,8 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
 
   std::shared_ptr<Factors> factors(const Eigen::VectorXd &added) override
   {
-    return along_bodies && fill() == Fill::NONE ? hessian->iterated(added) : hessian->factors(added);
+    return along_bodies && fill() == Fill::NONE ? hessian->iterated(added)
+                                                : hessian->factors(added);
   }
 
  private:

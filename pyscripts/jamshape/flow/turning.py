@@ -127,7 +127,8 @@ class TurningInSpace(Turning):
         vector = np.einsum("nb,nbk->nk", turn, body_axes(self._now))
         there = turned(self._now, vector)
         spin = self._host.spin(bodies, there) - self._host.spin(bodies, self._now)
-        return np.einsum("nbk,nk->nb", body_axes(there), spin)
+        found: FloatArray = np.einsum("nbk,nk->nb", body_axes(there), spin)
+        return found
 
 
 def turning_of(landscape: Landscape, host: Host, begun: FloatArray) -> Turning:

@@ -250,9 +250,7 @@ def slow_compress(
     for _, rate in protocol.rates:
         require_stated(kappa=rate)
     at = place(file, "slow.h5")
-    of = _start_of(
-        particles, start, phi=(phi_start, phi_end), n=n, seed=seed, dimension=dimension
-    )
+    of = _start_of(particles, start, phi=(phi_start, phi_end), n=n, seed=seed, dimension=dimension)
 
     def first() -> Packing:
         # Random insertion of bodies in space may end far below that of rods in the plane.

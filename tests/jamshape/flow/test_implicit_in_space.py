@@ -120,8 +120,8 @@ def test_a_body_with_different_drags_turns_to_second_order(kind, method, monkeyp
 
 def test_without_the_kinematics_of_rotation_vectors_it_would_be_first_order(monkeypatch, measured):
     monkeypatch.setattr(implicit, "_EXPLICIT_BELOW", 0.0)
-    monkeypatch.setattr(TurningInSpace, "excess", lambda self, x, velocity: np.zeros_like(x))
-    monkeypatch.setattr(TurningInSpace, "settled", lambda self, x, velocity: velocity)
+    monkeypatch.setattr(TurningInSpace, "excess", lambda *of: np.zeros_like(of[1]))
+    monkeypatch.setattr(TurningInSpace, "settled", lambda *of: of[2])
     found = orders("none", "tr-bdf2")
     measured(order=found[-1])
     assert found == pytest.approx([1.0, 1.0], abs=0.15)
