@@ -40,9 +40,6 @@ _ERROR, _IMPLICIT_ERROR = 1e-4, 1e-3  # default tolerances
 _FRAMES = 20
 _PHI_NAME = "phi_sheared"  # of the start, in files
 
-# Relative tolerance of the packing fraction of a random start.
-_ROUNDING = 1e-9
-
 
 @accepts_old(tolerance="integration_tolerance")
 @checked
@@ -381,11 +378,7 @@ def quasistatic_shear(
 
 def _flowing(of: Start) -> Packing:
     """Return the start, compressed at a finite rate."""
-    if of.known:
-        return of.known
-    random = of.random()
-    is_looser = random.phi < of.phi * (1 - _ROUNDING)
-    return compressed_start(random, of.phi) if is_looser else random
+    return of.known or compressed_start(of.random(), of.phi)
 
 
 def _still(of: Start) -> Packing:

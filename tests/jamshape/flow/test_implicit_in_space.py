@@ -252,6 +252,10 @@ def test_slow_compression_in_space_by_its_name(tmp_path):
     run = js.slow_compress(js.Superellipsoids(w1=0.6), n=6, dimension=3, phi=(0.5, 0.68), kappa=1e-3,
                            file=tmp_path / "a.h5", progress=False)  # fmt: skip
     assert run.packing(-1).dimension == 3
+    # As dense as random insertion alone: nothing to compress before.
+    loose = js.slow_compress(js.Spherocylinders(alpha=20), n=4, dimension=3, phi=(0.05, 0.051), kappa=1e-2,
+                             file=tmp_path / "b.h5", progress=False)  # fmt: skip
+    assert loose.packing(0).phi == pytest.approx(0.05, rel=1e-9)
     assert run.about["dimension"] == 3
     assert run.pressure[-1] > 0
     with pytest.raises(ValueError, match="dimension"):
