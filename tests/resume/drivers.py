@@ -229,6 +229,13 @@ CASES = DRIVERS | {
         "shear", "rods",
         {"gdot": 1e-3, "strain": 0.05, "flow": "pure", "integrator": "tr-bdf2", "integration_tolerance": 1e-2, "rows": 20},
     ),
+    "implicit compression in space": Case(
+        "slow_compress", "bodies", {"phi": (None, 0.752), "kappa": 1e-4},
+    ),
+    "implicit shear in space": Case(
+        "shear", "bodies",
+        {"gdot": 1e-3, "strain": 0.06, "integrator": "tr-bdf2", "integration_tolerance": 1e-2, "rows": 20},
+    ),
     "quasistatic pure shear at a pressure": Case(
         "quasistatic_shear", "dimers",
         {"step": 4e-3, "strain": 0.04, "flow": "pure", "pressure": 1e-3, "frames": 3},

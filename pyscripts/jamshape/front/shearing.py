@@ -33,14 +33,11 @@ from jamshape.protocols.approach import compressed_start
 from jamshape.protocols.quasistatic import compressed_to
 from jamshape.shapes.particles import Particles
 
-_SLOW = 3e-7  # rate below which implicit steps are faster than explicit ones
+_SLOW = {2: 3e-7, 3: 1e-7}  # rates below which implicit steps are faster than explicit ones
 _ERROR, _IMPLICIT_ERROR = 1e-4, 1e-3  # default tolerances
 
 _FRAMES = 20
 _PHI_NAME = "phi_sheared"  # of the start, in files
-
-# Relative tolerance of the packing fraction of a random start.
-_ROUNDING = 1e-9
 
 
 @accepts_old(tolerance="integration_tolerance")
@@ -93,8 +90,8 @@ def shear(
         Bonds of a side-to-side contact of rods, 1 or 2.
     integrator : str, optional
         ``rkc2``, ``heun/adaptive`` or ``heun`` in LAMMPS, as in `compress`; or ``tr-bdf2`` or ``sdirk2``, which take
-        implicit steps in the plane, without LAMMPS, at a cost that hardly grows as the rate falls. By default ``heun`` with one bond or with `dt`, else ``tr-bdf2``
-        in the plane at rates of 3e-7 and below, and else ``rkc2``.
+        implicit steps, without LAMMPS, at a cost that hardly grows as the rate falls. By default ``heun`` with one bond or with `dt`, else ``tr-bdf2``
+        at rates of 3e-7, in 3D 1e-7, and below, and else ``rkc2``.
     dt : float, [time], optional
         Time step of ``heun``; 0.05 by default.
     integration_tolerance : float, optional
@@ -146,8 +143,9 @@ def shear(
         longest = min(SlowShear.largest_strain, strain / rows)
         error = integration_tolerance or _IMPLICIT_ERROR
         slow = SlowShear(gdot, strain, flow, error, largest_strain=longest, method=integrator)
-        _require_plane(of, sides)
-        plan = implicit_driver.plan(lambda: _flowing(of), slow, of.made_from | {"rows": rows})
+        _require_two_bonds(sides)
+        made_from = of.made_from | {"rows": rows, "dimension": of.dimension}
+        plan = implicit_driver.plan(lambda: _flowing(of), slow, made_from)
     else:
         settings = Shear(
             gdot=gdot, strain_end=strain, flow=flow, dt=min(0.05, 0.01 / gdot) if dt is None else dt,
@@ -392,11 +390,7 @@ def quasistatic_shear(
 
 def _flowing(of: Start) -> Packing:
     """Return the start, compressed at a finite rate."""
-    if of.known:
-        return of.known
-    random = of.random()
-    is_looser = random.phi < of.phi * (1 - _ROUNDING)
-    return compressed_start(random, of.phi) if is_looser else random
+    return of.known or compressed_start(of.random(), of.phi)
 
 
 def _still(of: Start) -> Packing:
@@ -418,7 +412,7 @@ def _usual(gdot: float, dimension: int, *, whole: bool) -> str:
     """Choose the default integrator."""
     if not whole:
         return "heun"
-    return "tr-bdf2" if dimension == 2 and gdot <= _SLOW else "rkc2"
+    return "tr-bdf2" if gdot <= _SLOW[dimension] else "rkc2"
 
 
 def _require_cycle(amplitude: float, period: float, rows: int) -> None:
@@ -433,11 +427,11 @@ def _require_cycle(amplitude: float, period: float, rows: int) -> None:
         raise ArgumentError(said, {"rows": rows})
 
 
-def _require_plane(of: Start, sides: int) -> None:
-    """Refuse what implicit steps do not serve."""
-    if of.dimension != 2 or sides != 2:
+def _require_two_bonds(sides: int) -> None:
+    """Refuse the law on whose kinks implicit steps would end."""
+    if sides != 2:
         msg = (
-            f"implicit steps were requested in {of.dimension} dimensions with {sides} bonds side to side,"
-            " expected 2 and 2; choose another integrator"
+            f"implicit steps were requested with {sides} bonds side to side, expected 2; choose another"
+            " integrator"
         )
         raise ValueError(msg)

@@ -194,6 +194,8 @@ def require_same(content: Content, plan: Plan) -> None:
     advice = "choose another {file:name}, or use {again} to replace it"
     given = {"file": content.path, "again": True}
     stored, path = content.attributes, str(content.path).replace("{", "{{").replace("}", "}}")
+    if "dimension" not in stored and content.frames:  # slow runs of earlier versions
+        stored = {**stored, "dimension": content.frames[0].dimension}
     if stored.get(KIND) != plan.kind or "finished" not in stored:
         said = f"{path} does not hold {plan.what}, expected one; {advice}"
         raise ArgumentError(said, given)
