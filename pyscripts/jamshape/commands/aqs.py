@@ -4,8 +4,8 @@
 
     jamshape aqs --start packing.h5 --step 1e-3 --amplitude 0.05 --cycles 10 --out cycles.h5
 
-Starts from the last frame of a packing or run file (--start), or compresses a random packing quasistatically to
---phi. The volume is held, or with --pressure the pressure. The last line of standard output is one JSON object: the
+Starts from the last frame of a file with particles (--start), or that of --frame, or compresses a random packing
+quasistatically to --phi. The volume is held, or with --pressure the pressure. The last line of standard output is one JSON object: the
 final stress, the modulus of the first step, averages over the steady state, and the stress drops, each with the
 strain and the stress before it, and the dissipated energy over the volume. not_at_rest counts rows in which forces do
 not balance to --tolerance; the exit code is 0 only if there are none. Needs no LAMMPS. The same command resumes an
