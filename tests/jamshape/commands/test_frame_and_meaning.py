@@ -3,6 +3,7 @@
 import re
 import warnings
 
+import numpy as np
 import pytest
 
 import jamshape as js
@@ -13,7 +14,7 @@ from jamshape.files.lammps_text import write_dump
 DIMERS = js.Packing.of(
     "dimer", [[0.5, 0.5], [1.6, 1.6]], [0.3, 1.0], box=[2.2, 2.2], alpha=1, size=[1.0, 1.1]
 )
-FRAMES = [DIMERS, DIMERS.with_(step=3, position=DIMERS.position + [[0, 0], [0, 0.01]])]
+FRAMES = [DIMERS, DIMERS.with_(step=3, position=DIMERS.position + np.array([[0, 0], [0, 0.01]]))]
 FIRST = "--shape dimer --dimension 2 --frame 0"
 
 STARTED = (js.shear, js.cyclic_shear, js.slow_compress, js.quasistatic_shear)

@@ -152,7 +152,7 @@ def test_modes_of_a_file_swing_as_those_in_memory(packing, tmp_path):
 def test_ffmpeg_writes_the_frames_that_are_drawn(run, suffix, tmp_path):
     file, still = tmp_path / f"run{suffix}", tmp_path / "%d.png"
     js.animate(run, file, fps=4, every=4)
-    subprocess.run(["ffmpeg", "-v", "error", "-i", file, still], check=True)  # noqa: S607
+    subprocess.run(["ffmpeg", "-v", "error", "-i", file, still], check=True)
     movie = js.animate(run, every=4)
     assert len(list(tmp_path.glob("*.png"))) == len(movie) == 3
     for k in range(3):
