@@ -75,7 +75,7 @@ def file_of(folder: Path, recipe: Recipe) -> Path:
 
 
 class Means(NamedTuple):
-    """How samples are made; results do not depend on it."""
+    """Processes and folder of an ensemble, on which its results do not depend."""
 
     jobs: int
     """Number of processes."""
