@@ -49,7 +49,7 @@ def collections(movie, frame):
 
 
 def test_a_run_has_a_frame_for_each_of_its_own(run, tmp_path):
-    js.animate(run, tmp_path / "run.gif", fps=5)
+    js.animate(run, tmp_path / "run.gif", fps=5, dpi=40)
     with Image.open(tmp_path / "run.gif") as image:
         assert image.n_frames in {len(run), len(run) - 1}  # the start may equal its minimum
         durations = []
@@ -57,7 +57,7 @@ def test_a_run_has_a_frame_for_each_of_its_own(run, tmp_path):
             image.seek(k)
             durations.append(image.info["duration"])
     assert sum(durations) == pytest.approx(200 * len(run), rel=0.05)
-    js.animate(run, tmp_path / "few.gif", every=4)
+    js.animate(run, tmp_path / "few.gif", every=4, dpi=40)
     with Image.open(tmp_path / "few.gif") as image:
         assert image.n_frames == 3
 
@@ -151,9 +151,9 @@ def test_modes_of_a_file_swing_as_those_in_memory(packing, tmp_path):
 @pytest.mark.parametrize("suffix", [".mp4", ".mkv"])
 def test_ffmpeg_writes_the_frames_that_are_drawn(run, suffix, tmp_path):
     file, still = tmp_path / f"run{suffix}", tmp_path / "%d.png"
-    js.animate(run, file, fps=4, every=4)
+    js.animate(run, file, fps=4, every=4, dpi=60)
     subprocess.run(["ffmpeg", "-v", "error", "-i", file, still], check=True)
-    movie = js.animate(run, every=4)
+    movie = js.animate(run, every=4, dpi=60)
     assert len(list(tmp_path.glob("*.png"))) == len(movie) == 3
     for k in range(3):
         found = np.asarray(Image.open(tmp_path / f"{k + 1}.png").convert("RGB")).astype(int)
@@ -207,7 +207,7 @@ def test_the_command_makes_a_movie(run, packing, tmp_path, monkeypatch, capsys):
 
     monkeypatch.chdir(tmp_path)
     js.modes(packing).save("modes.h5")
-    done = draw(run.file, "--out", "run.gif", "--every", 4)
+    done = draw(run.file, "--out", "run.gif", "--every", 4, "--dpi", 40)
     assert done == (['{"out": "run.gif", "frames": 3}'], None)
     (said,), _ = draw("modes.h5", "--mode", 9, "--amplitude", 1, "--out", "mode.gif", "--dpi", 50)
     assert json.loads(said)["omega"] == js.load("modes.h5").omega[9]
