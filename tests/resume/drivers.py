@@ -172,7 +172,7 @@ DRIVERS = {
     ),
     "cyclic shear in LAMMPS": Case(
         "cyclic_shear", "rods",  # its box takes other cell vectors, to and fro
-        {"amplitude": 0.6, "period": 120.0, "cycles": 2, "rows": 20},
+        {"amplitude": 0.6, "period": 240.0, "cycles": 2, "rows": 12},
         {"amplitude": 0.5, "period": 250.0, "cycles": 3, "flow": "pure", "rows": 16, "frames": 1,
          "integrator": "heun/adaptive", "integration_tolerance": 1e-3, "sides": 1},
         {"period": 4e7, "rows": 1_000_000},
