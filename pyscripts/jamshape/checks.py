@@ -40,7 +40,9 @@ class _Typed(NamedTuple):
         """Format with the value, or with the spec ``name`` without; true options need no value."""
         if self.is_option:
             option = f"--{_OPTIONS.get(self.name, self.name).replace('_', '-')}"
-            return option if spec == "name" or self.value is True else f"{option} {self.value}"
+            # A packing that a command has read was typed as its file.
+            value = getattr(self.value, "file", None) or self.value
+            return option if spec == "name" or value is True else f"{option} {value}"
         value = str(self.value) if isinstance(self.value, Path) else self.value
         return self.name if spec == "name" else f"{self.name}={_shown(value)}"
 

@@ -6,9 +6,9 @@
     jamshape aqs --start packing.h5 --pressure 1e-3 --box yy --step 1e-3 --strain 0.5 --out normal.h5
     jamshape aqs --start packing.h5 --pressure 1e-3 --stress-step 1e-5 --out yield.h5
 
-Starts from the last frame of a packing or run file (--start), or compresses a random packing quasistatically to
---phi. The volume is held, or with --pressure the pressure, or with --box a normal stress. With --stress-step the shear
-stress is raised instead of the strain, until the packing yields. The last line of standard output is one JSON object: the
+Starts from the last frame of a file with particles (--start), or that of --frame, or compresses a random packing
+quasistatically to --phi. The volume is held, or with --pressure the pressure, or with --box a normal stress. With
+--stress-step the shear stress is raised instead of the strain, until the packing yields. The last line of standard output is one JSON object: the
 final stress, the modulus of the first step, averages over the steady state, and the stress drops, each with the
 strain and the stress before it, and the dissipated energy over the volume. not_at_rest counts rows in which forces do
 not balance to --tolerance; the exit code is 0 only if there are none. Needs no LAMMPS. The same command resumes an

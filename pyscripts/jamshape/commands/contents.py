@@ -31,6 +31,7 @@ from jamshape.front.frames import frames
 from jamshape.front.packing import Packing, public, results_of
 from jamshape.front.recorded import KINDS
 from jamshape.packing import Packing as PackingLike
+from jamshape.protocols.ensemble import ENSEMBLE
 from jamshape.recording.driver import KIND
 from jamshape.vibration.ensembles import TOLD, count_of, of_packing
 from jamshape.vibration.table import ModeTable, holds_modes, read_modes
@@ -175,7 +176,9 @@ def _cost(path: Path, known: Mapping[str, Any]) -> dict[str, Any]:
 
 def _go_on(path: Path, known: Mapping[str, Any]) -> str:
     """Advise how to continue an unfinished run."""
-    kind = KINDS.get(str(known.get(KIND)))
+    kind = KINDS.get(name := str(known.get(KIND)))
+    if name == ENSEMBLE:
+        return f"js.resume({str(path)!r}) in Python"
     if kind and kind.plan_of is None:
         return _OTHER_COMMAND.format(result=_result_of(path))
     return _SAME_COMMAND

@@ -3,8 +3,8 @@
     jamshape cycle --alpha 4 --n 256 --phi 0.8 --amplitude 0.05 --period 2000 --cycles 20 --out cycles.h5
 
 The strain is a triangle wave, from 0 to the amplitude, to minus the amplitude, and back to 0, at the constant rate
-4 amplitude / period. Starts from a random packing compressed fast to --phi, or from the last frame of a run or packing
-file (--start). The last line of standard output is one JSON object with the state at the end, and of the first and
+4 amplitude / period. Starts from a random packing compressed fast to --phi, or from the last frame of a file
+with particles (--start), or that of --frame. The last line of standard output is one JSON object with the state at the end, and of the first and
 the last cycle the mean squared displacement of particles between its ends (displacement) and the dissipated energy
 over the volume (dissipated). The same command resumes an interrupted run and reports a finished one; it refuses a file
 with other settings, unless --again replaces it. With --seconds it stops in time, before a queue ends it: the exit

@@ -56,6 +56,7 @@ def draw_cycles(axes: Axes, run: Cycles, system: System) -> None:
         part = slice((cycle - 1) * run.rows, cycle * run.rows + 1)
         axes.plot(run.strain[part], run.stress[part], color=color, lw=1, label=f"cycle {cycle}")
     axes.set(xlabel=r"strain $\gamma$", ylabel=rf"shear stress  ${pressure_unit([system])}$")
+    axes.locator_params(axis="x", nbins=5)  # small strains have long numbers
     axes.set_title(f"{systems_text([system])}, cyclic shear", size=9)
     axes.legend(fontsize=8)
 

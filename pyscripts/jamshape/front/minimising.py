@@ -10,7 +10,7 @@ from jamshape.checks import RANGES, require_in, require_no_effect, require_state
 from jamshape.front.making import made_or_kept
 from jamshape.front.packing import Packing
 from jamshape.front.reading import Held, packing_of
-from jamshape.front.starts import digest, told_of
+from jamshape.front.starts import told_of
 from jamshape.minima.boxes import FIXED, FREE
 from jamshape.minima.target import FixedBox, Target
 from jamshape.protocols.defaults import aim_of
@@ -133,7 +133,7 @@ def _aim(
 def _made_from(state: Packing) -> dict[str, object]:
     """Describe the state, and tell it from others, wherever its file lies."""
     name = state.file.name if state.file else "packing"
-    return told_of(state) | {"start": name, "start_digest": digest(state)}
+    return told_of(state) | {"start": name}
 
 
 def _recipe(state: Packing, way: Given, strict: bool, stable_to_shear: bool) -> Recipe:

@@ -200,12 +200,18 @@ def require_same(content: Content, plan: Plan) -> None:
         said = f"{path} does not hold {plan.what}, expected one; {advice}"
         raise ArgumentError(said, given)
     for name, value in plan.settings.items():
+        if name in _LATER and name not in stored:
+            continue
         if not _is_same(stored.get(name), value):
-            argument = plan.arguments.get(name, name)
+            argument = plan.arguments.get(name, _LATER.get(name, name))
             said = (
                 f"{path} holds {plan.what} with {{{argument}}}, expected {_Shown(value)}; {advice}"
             )
             raise ArgumentError(said, {argument: _Shown(stored.get(name)), **given})
+
+
+_LATER = {"start_digest": "start"}
+"""Settings that files of earlier versions lack, with their arguments."""
 
 
 class _Shown:
