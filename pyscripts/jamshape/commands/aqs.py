@@ -7,7 +7,8 @@
 Starts from the last frame of a packing or run file (--start), or compresses a random packing quasistatically to
 --phi. The volume is held, or with --pressure the pressure. The last line of standard output is one JSON object: the
 final stress, the modulus of the first step, averages over the steady state, and the stress drops, each with the
-strain and the stress before it, and the dissipated energy over the volume. not_at_rest counts rows in which forces do
+strain and the stress before it, and the dissipated energy over the volume; with --amplitude also per_cycle, as of
+`jamshape cycle`. not_at_rest counts rows in which forces do
 not balance to --tolerance; the exit code is 0 only if there are none. Needs no LAMMPS. The same command resumes an
 interrupted run and leaves a finished one alone; it refuses a file with other settings, unless --again replaces it.
 With --seconds it stops in time, before a queue ends it: the exit code is then 75.
@@ -44,6 +45,7 @@ def main(options: Namespace) -> None:
     at_end = ("strain", "phi", "stress", "pressure", "sigma", "mu", "z")
     found = {name: float(run[name][-1]) for name in at_end}
     found |= {"not_at_rest": int((~run.at_rest).sum()), "modulus": run.modulus(), **_steady(run)}
+    found |= {"per_cycle": run.cycles()} if run.steps_per_cycle else {}
     report({"out": options.out, **found, "events": run.events(options.least_drop)})
 
 

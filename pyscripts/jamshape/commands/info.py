@@ -48,6 +48,14 @@ _LINES = {
         "to strain {strain_end:g}",
         "at pressure {hold_pressure:g}",
     ),
+    "last cycle": (
+        "number {last_cycle[number]}",
+        "work {last_cycle[work]:.4g}",
+        "lost {last_cycle[lost]:.4g}",
+        "storage modulus {last_cycle[storage]:.4g}",
+        "loss modulus {last_cycle[loss]:.4g}",
+        "{returned_text}",
+    ),
     "modes": ("{modes} of {n_modes}", "{bands_text}", "by the method {method!r}"),
     "holds": ("{frames} frames", "{rows} rows of error and time", "step {step}", "time {time:.6g}"),
     "error": ("{error_of} {error:.2g}",),
@@ -96,10 +104,20 @@ def lines_of(found: Mapping[str, Any]) -> Iterator[str]:
         counts = {name: count for name, count in found["bands"].items() if count is not None}
         told = ", ".join(f"{count} {name}" for name, count in counts.items())
         known["bands_text"] = told or "no bands"
+    if "last_cycle" in found:
+        known["returned_text"] = _returned(found["last_cycle"])
     for subject, parts in _LINES.items():
         said = [text for text in (_filled(part, known) for part in parts) if text]
         if said:
             yield f"{subject + ':':12} {', '.join(said)}"
+
+
+def _returned(cycle: Mapping[str, Any]) -> str:
+    """Tell whether particles return."""
+    if cycle["is_reversible"] is None:
+        return "without its states"
+    word = "reversible" if cycle["is_reversible"] else "not reversible"
+    return f"{word}: particles within {cycle['largest']:.2g} radii, {cycle['changed']} contacts changed"
 
 
 def _filled(part: str, known: Mapping[str, Any]) -> str:

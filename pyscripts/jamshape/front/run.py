@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -15,7 +15,14 @@ import numpy as np
 
 from jamshape.arguments import checked
 from jamshape.arrays import BoolArray, FloatArray, IntArray
-from jamshape.checks import RANGES, NotReachedWarning, Range, require_in, require_number, require_positive
+from jamshape.checks import (
+    RANGES,
+    NotReachedWarning,
+    Range,
+    require_in,
+    require_number,
+    require_positive,
+)
 from jamshape.files.content import add_attributes
 from jamshape.files.disk import named, settled
 from jamshape.files.h5md import (
@@ -29,7 +36,7 @@ from jamshape.files.h5md import (
 from jamshape.files.lock import Lock
 from jamshape.flow.cyclic_shear import QUARTERS
 from jamshape.flow.quasistatic import QuasistaticShear, sheared
-from jamshape.front.frames import Frames, recorded_frames
+from jamshape.front.frames import recorded_frames
 from jamshape.front.packing import Packing
 from jamshape.front.progress import follow, place
 from jamshape.landscape import Landscape, State
@@ -41,7 +48,7 @@ from jamshape.measures.contact_changes import (
     contact_changes,
     numbers_of_changes,
 )
-from jamshape.measures.cycles import Cycle, Rows, cycles_of
+from jamshape.measures.cycles import Cycle, Ends, Rows, cycles_of
 from jamshape.measures.events import Event, stress_drops
 from jamshape.measures.jamming import Jamming, Tried, minimised_frames
 from jamshape.measures.onset import OnsetFit, fit_onset
@@ -366,7 +373,7 @@ class CyclicShearFile(Recorded):
         return np.asarray(whole.mean(axis=1) * period)
 
     @checked
-    def cycles(self, tolerance: float = RETURNED) -> list[Cycle]:
+    def cycles(self, tolerance: float = RETURNED, *, first: int = 1) -> list[Cycle]:
         """Describe all whole cycles: energies, storage and loss modulus, and whether particles return.
 
         All particles count in the distances, which are those of states that were kept: with `frames`, not all are.
@@ -375,6 +382,8 @@ class CyclicShearFile(Recorded):
         ----------
         tolerance : float
             Largest distance of a particle of a reversible cycle, over the smallest inner radius.
+        first : int
+            Number of the first cycle to describe, counted from 1 or, if negative, from the end.
 
         Returns
         -------
@@ -387,7 +396,7 @@ class CyclicShearFile(Recorded):
         frames, period = recorded_frames(self.file), float(self.about["period"])
         kept = {round(time / period): k for k, time in enumerate(frames.times.tolist())}
         rows = Rows(self.strain, self.stress, self.dissipated, int(self.about["rows"]))
-        return cycles_of(rows, _states_of(frames, kept), tolerance, rattlers=True)
+        return cycles_of(rows, Ends(kept, frames, rattlers=True), tolerance, first)
 
     def __repr__(self) -> str:
         cycles = len(self.displacement)
@@ -425,7 +434,7 @@ class QuasistaticShearFile(Recorded):
         return QUARTERS * self._how.quarter if self._how.cycles else 0
 
     @checked
-    def cycles(self, tolerance: float = RETURNED) -> list[Cycle]:
+    def cycles(self, tolerance: float = RETURNED, *, first: int = 1) -> list[Cycle]:
         """Describe all whole cycles, as `CyclicShearFile.cycles`; none without an amplitude.
 
         Rattlers, whose places are arbitrary, do not count in the distances.
@@ -434,6 +443,8 @@ class QuasistaticShearFile(Recorded):
         ----------
         tolerance : float
             Largest distance of a particle of a reversible cycle, over the smallest inner radius.
+        first : int
+            Number of the first cycle to describe, counted from 1 or, if negative, from the end.
 
         Examples
         --------
@@ -459,7 +470,7 @@ class QuasistaticShearFile(Recorded):
         done = (len(self.strain) - 1) // per_cycle
         lost = self["lost"][1 : done * per_cycle + 1].reshape(done, per_cycle).sum(axis=1)
         rows = Rows(self.strain, self.stress, lost, per_cycle)
-        return cycles_of(rows, _states_of(frames, kept), tolerance, rattlers=False)
+        return cycles_of(rows, Ends(kept, frames, rattlers=False), tolerance, first)
 
     @property
     def _how(self) -> QuasistaticShear:
@@ -668,11 +679,6 @@ class LadderFile(Recorded):
 
 _OBSERVABLE_OF = {"u0": "u"}
 """Observable of a control parameter."""
-
-
-def _states_of(frames: Frames, kept: Mapping[int, int]) -> Callable[[int], Packing | None]:
-    """Return a function that reads the state after a number of cycles from its frame."""
-    return lambda number: frames[kept[number]] if number in kept else None
 
 
 def _brought_along(kind: type[Recorded], name: str, content: bytes) -> Recorded:

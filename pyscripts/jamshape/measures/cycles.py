@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -138,33 +138,41 @@ def _held(first: Packing, second: Packing) -> BoolArray:
     return held if held.any() else ~held
 
 
-def cycles_of(
-    rows: Rows,
-    state: Callable[[int], Packing | None],
-    tolerance: float,
-    *,
-    rattlers: bool,
-) -> list[Cycle]:
-    """Describe all whole cycles of a run.
+class Ends(NamedTuple):
+    """States at strain 0."""
+
+    kept: Mapping[int, int]
+    """Frames of the states after a number of cycles, of those that were kept."""
+    frames: Sequence[Packing]
+    rattlers: bool
+    """As in `distance`."""
+
+    def distance(self, number: int) -> Distance | None:
+        """Return the distance between both ends of a cycle, or None if one was not kept."""
+        if number not in self.kept or number - 1 not in self.kept:
+            return None
+        first, second = (self.frames[self.kept[k]] for k in (number - 1, number))
+        return distance(first, second, rattlers=self.rattlers)
+
+
+def cycles_of(rows: Rows, ends: Ends, tolerance: float, first: int = 1) -> list[Cycle]:
+    """Describe the whole cycles of a run.
 
     Parameters
     ----------
     rows : Rows
-    state : callable
-        Returns the state at strain 0 after a number of cycles, or None if it was not kept.
+    ends : Ends
     tolerance : float
         Largest distance of a particle of a reversible cycle, over the smallest inner radius.
-    rattlers : bool
-        As in `distance`.
+    first : int
+        Number of the first cycle to describe, counted from 1 or, if negative, from the end.
     """
-    found, first = [], state(0)
-    for number, lost in enumerate(rows.lost.tolist(), start=1):
+    found, done = [], len(rows.lost)
+    for number in range(max(1, first if first > 0 else done + 1 + first), done + 1):
         strain, stress = rows.of(number)
-        second = state(number)
-        far = distance(first, second, rattlers=rattlers) if first and second else None
+        far = ends.distance(number)
         rms, largest, changed = far or (math.nan, math.nan, None)
         returns = None if far is None else far.largest <= tolerance
-        energies = work_of(strain, stress), lost
+        energies = work_of(strain, stress), float(rows.lost[number - 1])
         found.append(Cycle(number, *energies, *moduli_of(strain, stress), rms, largest, changed, returns))  # fmt: skip
-        first = second
     return found
