@@ -71,7 +71,9 @@ def is_elastic(packing: Packing, amplitude: float, steps: int = 20, flow: str = 
     return distance(begun, run.state.packing(packing), rattlers=False).changed == 0
 
 
-def elastic_limit(packing: Packing, accuracy: float = 0.05, steps: int = 20, flow: str = "simple") -> ElasticLimit:
+def elastic_limit(
+    packing: Packing, accuracy: float = 0.05, steps: int = 20, flow: str = "simple"
+) -> ElasticLimit:
     """Find the amplitude at which a cycle of a packing is no longer elastic.
 
     A cycle of a smaller amplitude is part of the path of an elastic one, and so elastic too: the limit is unique. A

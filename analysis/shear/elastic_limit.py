@@ -45,7 +45,9 @@ def parser() -> ArgumentParser:
     found.add_argument("--samples", type=int, default=8, help="seeds (%(default)s)")
     close = "relative distance of the amplitudes that enclose the limit (%(default)s)"
     found.add_argument("--accuracy", type=float, default=0.05, help=close)
-    found.add_argument("--steps", type=int, default=20, help="steps of a quarter of a cycle (%(default)s)")
+    found.add_argument(
+        "--steps", type=int, default=20, help="steps of a quarter of a cycle (%(default)s)"
+    )
     found.add_argument("--out", type=Path, required=True, help="folder")
     return found
 
@@ -76,7 +78,9 @@ def figure_for(limits: dict[float, list[ElasticLimit]], options: Namespace) -> F
         bars = [one.error for one in ordered]
         axes.errorbar(at, left, xerr=bars, fmt=".-", color=f"C{k}", drawstyle="steps-pre", lw=1,
                       label=rf"$\alpha={alpha:g}$")  # fmt: skip
-    axes.set(xscale="log", xlabel="strain amplitude", ylabel="fraction still elastic", ylim=(-0.03, 1.03))
+    axes.set(
+        xscale="log", xlabel="strain amplitude", ylabel="fraction still elastic", ylim=(-0.03, 1.03)
+    )
     energy = attributes_text({"u0": options.u0})[0]
     axes.set_title(
         f"spherocylinders in 2D, $N={options.n}$, {energy}, {options.samples} packings each\n"
@@ -101,7 +105,9 @@ def main(options: Namespace) -> None:
     rows = []
     for alpha, found in limits.items():
         at = [one.value for one in found]
-        rows.append({"alpha": alpha, "amplitude": mean(at), "median": np.median(at), "limits": found})
+        rows.append(
+            {"alpha": alpha, "amplitude": mean(at), "median": np.median(at), "limits": found}
+        )
     report({"out": picture, "n": options.n, "u0": options.u0, "elastic_limits": rows})
 
 

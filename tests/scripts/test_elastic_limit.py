@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from pictures import image
 
 import jamshape as js
 from common.elastic_limit import elastic_limit, is_elastic
-from pictures import image
 
 SCRIPT = "shear/elastic_limit.py"
 
@@ -28,7 +28,20 @@ def test_a_limit_outside_the_range_of_amplitudes_is_open():
 
 
 def test_the_script_finds_limits_once(report, tmp_path):
-    words = ("--alpha", 0, "--n", 12, "--samples", 2, "--accuracy", 0.5, "--steps", 5, "--out", tmp_path)
+    words = (
+        "--alpha",
+        0,
+        "--n",
+        12,
+        "--samples",
+        2,
+        "--accuracy",
+        0.5,
+        "--steps",
+        5,
+        "--out",
+        tmp_path,
+    )
     found = report(SCRIPT, *words)
     (row,) = found["elastic_limits"]
     low, high = np.array([[one["low"], one["high"]] for one in row["limits"]]).T

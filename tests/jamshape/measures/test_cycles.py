@@ -5,6 +5,10 @@ import pytest
 from small_packings import jammed
 
 import jamshape as js
+from jamshape.checks import TimeLimitError
+from jamshape.commands.contents import contents_of
+from jamshape.commands.info import lines_of
+from jamshape.measures.contact_changes import At
 from jamshape.measures.cycles import distance, moduli_of, work_of
 from jamshape.packing import State
 
@@ -89,13 +93,7 @@ def test_a_packing_in_another_order_box_and_place_is_the_same(rods):
     other = other.with_(**{name: getattr(other, name)[order] for name in names})
     found = distance(rods, other, rattlers=True)
     assert found.largest < 1e-12
-    assert found.changed == len(_bonds(rods) ^ _bonds(other))
-
-
-def _bonds(packing):
-    from jamshape.measures.contact_changes import At  # noqa: PLC0415
-
-    return At(0.0, packing).bonds
+    assert found.changed == len(At(0.0, rods).bonds ^ At(0.0, other).bonds)
 
 
 def test_moved_and_turned_particles_are_as_far_as_they_moved(rods):
@@ -156,6 +154,7 @@ def test_a_small_quasistatic_cycle_returns_and_a_large_one_does_not(tmp_path, me
     small = aqs(tmp_path, step=1e-5, amplitude=1e-4, cycles=2)
     modulus = js.modes(small.packing(1)).moduli.simple_shear.relaxed
     assert [cycle.number for cycle in small.cycles()] == [1, 2]
+    assert [cycle.number for cycle in small.cycles(first=-1)] == [2]
     for cycle in small.cycles():
         assert cycle.is_reversible
         assert cycle.changed == 0
@@ -170,6 +169,9 @@ def test_a_small_quasistatic_cycle_returns_and_a_large_one_does_not(tmp_path, me
     assert cycle.loss > 0
     assert cycle.lost == pytest.approx(large["lost"][1:].sum(), rel=1e-14)
     assert large.cycles(tolerance=1e3)[0].is_reversible
+    found = contents_of(large.file)
+    assert found["last_cycle"] == cycle._asdict()
+    assert any("not reversible: particles within" in line for line in lines_of(found))
 
 
 def test_work_of_a_quasistatic_cycle_is_lost_or_stored(tmp_path):
@@ -178,6 +180,17 @@ def test_work_of_a_quasistatic_cycle_is_lost_or_stored(tmp_path):
     for cycle in run.cycles():
         ends = run["u"][[(cycle.number - 1) * per_cycle, cycle.number * per_cycle]]
         assert cycle.work - cycle.lost == pytest.approx(np.diff(ends)[0], abs=1e-9 * cycle.work)
+
+
+def test_only_whole_cycles_of_an_unfinished_run_count(tmp_path):
+    given = {"step": 1e-3, "amplitude": 1e-3}
+    with pytest.raises(TimeLimitError):
+        aqs(tmp_path, seconds=1.5, cycles=10_000, **given)
+    part = js.load(tmp_path / "a.h5")
+    cycles = part.cycles()
+    assert len(cycles) == (len(part.strain) - 1) // 4
+    one = aqs(tmp_path, cycles=1, again=True, **given)
+    assert cycles[:1] == one.cycles()[: len(cycles)]
 
 
 def test_only_whole_cycles_count_and_a_strain_has_none(tmp_path):
