@@ -113,7 +113,7 @@ def lines_of(found: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _returned(cycle: Mapping[str, Any]) -> str:
-    """Tell whether particles return."""
+    """Describe whether particles return."""
     if cycle["is_reversible"] is None:
         return "without its states"
     word = "reversible" if cycle["is_reversible"] else "not reversible"

@@ -145,7 +145,7 @@ class Ends(NamedTuple):
     """Frames of the states after a number of cycles, of those that were kept."""
     frames: Sequence[Packing]
     rattlers: bool
-    """As in `distance`."""
+    """Whether rattlers count, as in `distance`."""
 
     def distance(self, number: int) -> Distance | None:
         """Return the distance between both ends of a cycle, or None if one was not kept."""
