@@ -84,6 +84,7 @@ QUICK = [
     Told("*", "jamshape shear", "--alpha 1 --n 16 --gdot 1e-2 --strain 0.5 --rows 20 --frames 4"),
     Told("*", "jamshape cycle", "--alpha 1 --n 16 --period 20 --cycles 2 --rows 8"),
     Told("*", "jamshape aqs", "--step 1e-2 --strain 0.1"),
+    Told("*", "analysis/shear/elastic_limit.py", "--alpha 0 --n 12 --samples 1 --accuracy 0.5 --steps 4"),
     Told("*", "jamshape draw", "--dpi 50"),
     Told("*", "jamshape reproduce", "--dry-run"),
     Told("*", "-in inputs/compress_spherocylinder.in", DECK),

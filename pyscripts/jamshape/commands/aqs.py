@@ -10,7 +10,8 @@ Starts from the last frame of a file with particles (--start), or that of --fram
 quasistatically to --phi. The volume is held, or with --pressure the pressure, or with --box a normal stress. With
 --stress-step the shear stress is raised instead of the strain, until the packing yields. The last line of standard output is one JSON object: the
 final stress, the modulus of the first step, averages over the steady state, and the stress drops, each with the
-strain and the stress before it, and the dissipated energy over the volume. not_at_rest counts rows in which forces do
+strain and the stress before it, and the dissipated energy over the volume; with --amplitude also per_cycle, as of
+`jamshape cycle`. not_at_rest counts rows in which forces do
 not balance to --tolerance; the exit code is 0 only if there are none. Needs no LAMMPS. The same command resumes an
 interrupted run and leaves a finished one alone; it refuses a file with other settings, unless --again replaces it.
 With --seconds it stops in time, before a queue ends it: the exit code is then 75.
@@ -49,6 +50,7 @@ def main(options: Namespace) -> None:
     found |= {"not_at_rest": int((~run.at_rest).sum()), "modulus": run.modulus(), **_steady(run)}
     if options.stress_step is not None:
         found["yield_stress"] = run.yield_stress and run.yield_stress._asdict()
+    found |= {"per_cycle": run.cycles()} if run.steps_per_cycle else {}
     report({"out": options.out, **found, "events": run.events(options.least_drop)})
 
 

@@ -29,7 +29,8 @@ from jamshape.files.outcomes import is_reached, shortfall
 from jamshape.files.signature import DATA, DUMP, GSD, HDF5, REFUSED, RESTART, SIGNATURES, format_of
 from jamshape.front.frames import frames
 from jamshape.front.packing import Packing, public, results_of
-from jamshape.front.recorded import KINDS
+from jamshape.front.recorded import KINDS, run_file
+from jamshape.front.run import CyclicShearFile, QuasistaticShearFile
 from jamshape.packing import Packing as PackingLike
 from jamshape.protocols.ensemble import ENSEMBLE
 from jamshape.recording.driver import KIND
@@ -108,6 +109,8 @@ def _particles(path: Path) -> dict[str, Any]:
         found["kappa"] = np.ravel(found["kappa"])[-1].item()
     if "outcome" in known:
         found |= {"reached": is_reached(known), "shortfall": shortfall(known) or None}
+    if is_run and "cycles" in known:
+        found |= _last_cycle(path)
     found |= {"frames": count_frames(path), **_cost(path, known)}
     found |= {"format_version": read_format_version(path), "jamshape_version": read_creator(path)}
     found |= {"origin": origin} if (origin := read_origin(path)) else {}
@@ -160,6 +163,14 @@ def _order(packing: Packing) -> dict[str, float]:
     names = ["S_2", "S_4"] + ["C_4"] * (packing.n <= _MOST_CUBATIC)
     found = {name: getattr(packing, name) for name in names}
     return {name: value for name, value in found.items() if not math.isnan(value)}
+
+
+def _last_cycle(path: Path) -> dict[str, Any]:
+    """Describe the last whole cycle of a shear to and fro, if there is one."""
+    run = run_file(path)
+    if isinstance(run, CyclicShearFile | QuasistaticShearFile) and (last := run.cycles(first=-1)):
+        return {"last_cycle": last[0]._asdict()}
+    return {}
 
 
 def _cost(path: Path, known: Mapping[str, Any]) -> dict[str, Any]:

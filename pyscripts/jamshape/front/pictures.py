@@ -162,7 +162,7 @@ def _cyclic(run: CyclicShearFile, axes: Axes, color: str) -> None:
 def _quasistatic(run: QuasistaticShearFile, axes: Axes, color: str) -> None:
     del color
     who = system_of(run.about, *read_style(run.file))
-    if run.cycles:
+    if run.steps_per_cycle:
         draw_cycles(axes, Cycles(run.strain, run.stress, run.steps_per_cycle), who)
         return
     draw_steps(axes, run.observables, who)
