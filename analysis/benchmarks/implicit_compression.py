@@ -104,7 +104,7 @@ def timed(start: Packing, options: Namespace, tolerance: float) -> dict[str, Any
 
 def timed_explicit(start: Packing, options: Namespace) -> dict[str, Any]:
     """Compress by rkc2; evaluations, the pressure at the end, and seconds of a core."""
-    rkc2 = {"sides": 2, "integrator": "rkc2", "tolerance": TOLERANCE_EXPLICIT}
+    rkc2: dict[str, Any] = {"sides": 2, "integrator": "rkc2", "tolerance": TOLERANCE_EXPLICIT}
     settings = Compression(kappa=options.kappa, phi_end=options.phi_end, **rkc2)
     with Session() as session:
         began = time.process_time()
