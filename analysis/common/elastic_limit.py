@@ -34,6 +34,11 @@ class ElasticLimit(NamedTuple):
     """Number of cycles that it took."""
 
     @property
+    def is_enclosed(self) -> bool:
+        """Whether there are both."""
+        return self.low > 0 and math.isfinite(self.high)
+
+    @property
     def value(self) -> float:
         """Middle of both."""
         return (self.low + self.high) / 2

@@ -6,7 +6,8 @@ Makes packings, one for each seed, and bisects the amplitude with quasistatic cy
 1e-3 of amplitude times range of the stress, and ends with the contacts with which it began. Draws which fraction of the
 packings is still elastic at an amplitude. Started again after a kill it goes on: packings and amplitudes that are there
 are not made again. The last line of standard output is one JSON object with the two amplitudes that enclose the limit
-of each packing, and for each alpha the mean of their middles with its standard error and their median.
+of each packing (0 or null if the limit is beyond all amplitudes), and for each alpha the mean of the middles of the
+others with its standard error and their median.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ def figure_for(limits: dict[float, list[ElasticLimit]], options: Namespace) -> F
     figure = figure_of(5.0, 3.6)
     axes = figure.subplots()
     for k, (alpha, found) in enumerate(limits.items()):
-        ordered = sorted(one for one in found if np.isfinite(one.high))
+        ordered = sorted(one for one in found if one.is_enclosed)
         at = [one.value for one in ordered]
         left = 1 - np.arange(1, len(at) + 1) / len(found)
         bars = [one.error for one in ordered]
@@ -104,9 +105,9 @@ def main(options: Namespace) -> None:
     save_figure(figure_for(limits, options), picture)
     rows = []
     for alpha, found in limits.items():
-        at = [one.value for one in found]
+        at = [one.value if one.is_enclosed else np.nan for one in found]
         rows.append(
-            {"alpha": alpha, "amplitude": mean(at), "median": np.median(at), "limits": found}
+            {"alpha": alpha, "amplitude": mean(at), "median": np.nanmedian(at), "limits": found}
         )
     report({"out": picture, "n": options.n, "u0": options.u0, "elastic_limits": rows})
 

@@ -460,7 +460,7 @@ class QuasistaticShearFile(Recorded):
         >>> packing = js.make_packing(discs, n=16, u0=1e-4, progress=False)
         >>> run = js.quasistatic_shear(start=packing, step=1e-5, amplitude=1e-4, cycles=2, progress=False)
         >>> cycle = run.cycles()[-1]
-        >>> cycle.number, cycle.is_reversible, cycle.changed, abs(cycle.loss) < 1e-6 * cycle.storage
+        >>> cycle.number, cycle.is_reversible, cycle.changed, abs(cycle.loss) < 1e-3 * abs(cycle.storage)
         (2, True, 0, True)
         """
         require_positive(tolerance=tolerance)

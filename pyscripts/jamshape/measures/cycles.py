@@ -97,10 +97,10 @@ def moduli_of(strain: FloatArray, stress: FloatArray) -> Moduli:
     >>> import numpy as np
     >>> phase = np.linspace(0, 1, 401)
     >>> strain = 0.01 * np.abs((4 * phase + 1) % 4 - 2) - 0.01
-    >>> [round(float(one), 6) for one in moduli_of(strain, 3 * strain)]
+    >>> [round(abs(one), 6) for one in moduli_of(strain, 3 * strain)]
     [3.0, 0.0]
     >>> rate = 2 * np.gradient(strain, 2 * np.pi * phase)
-    >>> [round(float(one), 3) for one in moduli_of(strain, rate)]
+    >>> [round(abs(one), 3) for one in moduli_of(strain, rate)]
     [0.0, 2.0]
     """
     phase = np.exp(-2j * np.pi * np.arange(len(strain)) / (len(strain) - 1))
