@@ -203,7 +203,7 @@ class QuasistaticShear:
 
 
 class _Normal(NamedTuple):
-    """What the work of normal stresses depends on."""
+    """Quantities on which the work of normal stresses depends."""
 
     pressure: float
     volume: float

@@ -35,7 +35,7 @@ _ROUGH = 1e-6  # residual of minima on the way
 _TIGHT, _FLOORS = (
     1e-12,
     10.0,
-)  # residual near the end, where soft modes move stresses; at least so many roundings
+)  # residual near the end, where soft modes move stresses; at least ten times the rounding
 _NEAR = (
     0.1  # relative distance of the stress to its target below which minima have the full tolerance
 )
@@ -200,7 +200,7 @@ class Yielding:
         return found
 
     def find(self, landscape: Landscape, start: State) -> Minimum:
-        """Lead a state to the goal; errors as `advance` and `require`."""
+        """Find the packing at the goal, from a state; errors as `advance` and `require`."""
         self.require(landscape)
         at = Settling(start)
         while not at.done:

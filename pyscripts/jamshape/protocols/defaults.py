@@ -196,7 +196,7 @@ def recipe_for(
     """
     strict, stable = (bool(given.pop(name, None)) for name in ("strict", "stable_to_shear"))
     other = {name: given.pop(name, None) for name in ("pressure", "phi", "box")}
-    other["box"] = FREE if stable and other["box"] is None else other["box"]
+    other["box"] = other["box"] or (FREE if stable else None)
     source = None if given.get("start") is None else Source.read(Path(given["start"]))
     if source is not None:
         source.require(particles, n=given.get("n"), dimension=dimension, seed=seed)
@@ -207,11 +207,10 @@ def recipe_for(
     usual = PROTOCOLS[name]
     get = usual.defaults(dimension) | _allowed(given, usual, name)
     aim = aim_of(get, given, **other)
-    if isinstance(aim, Yielding):
+    if aim is not None:
         get |= {"u0": aim.u0 or _IN_BETWEEN, "accuracy": aim.accuracy}
     require_with("u0", get["u0"] or None, accuracy=given.get("accuracy"))
-    if source is not None:
-        get |= _of_source(source, given)
+    get |= {} if source is None else _of_source(source, given)
     how, target = usual.compose(get)
     numbers = (get["n"], dimension, 1 if seed is None else seed, get["phi_start"])
     return Recipe(particles, *numbers, how, aim or target, strict=strict, stable_to_shear=stable)
