@@ -25,7 +25,8 @@ Vec<3> vec3(const double *from) { return {{from[0], from[1], from[2]}}; }
 
 AffineBox::AffineBox(LAMMPS_NS::LAMMPS *lmp, const Upper &gradient, Reference fixed_point) :
     Pointers(lmp), fixed(fixed_point), dimension(domain->dimension), now{}, next_rate(gradient),
-    time_base(0.0), late(0.0), reached_step(update->ntimestep), started(false), yields(false), left{}
+    time_base(0.0), late(0.0), reached_step(update->ntimestep), started(false), yields(false),
+    left{}
 {
   now.rate = gradient;
 }

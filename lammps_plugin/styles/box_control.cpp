@@ -109,7 +109,8 @@ int BoxControl::read(int k, int narg, char **arg)
 
 bool BoxControl::any_component() const
 {
-  return std::any_of(components.begin(), components.end(), [](const Target &t) { return t.is_set; });
+  return std::any_of(components.begin(), components.end(),
+                     [](const Target &t) { return t.is_set; });
 }
 
 bool BoxControl::shears() const
@@ -127,7 +128,8 @@ void BoxControl::drive(const Upper &gradient)
   }
   for (int k = 0; k < 6; ++k) {
     if (!components[k].is_set || entry(gradient, k) == 0.0) continue;
-    wrong(std::string("'stress ") + NAMES[k] + "' and a rate of the same component of the flow, "
+    wrong(std::string("'stress ") + NAMES[k] +
+          "' and a rate of the same component of the flow, "
           "expected one of them: leave out either.");
   }
   rates = gradient;
@@ -135,8 +137,8 @@ void BoxControl::drive(const Upper &gradient)
 
 void BoxControl::require_complete(bool holds_volume) const
 {
-  const bool changes_volume = is_isotropic || components[0].is_set || components[1].is_set ||
-                              components[2].is_set;
+  const bool changes_volume =
+      is_isotropic || components[0].is_set || components[1].is_set || components[2].is_set;
   if (!is_on() && t_box > 0.0) {
     wrong("tbox without a controlled stress, expected 'pressure' or 'stress': leave tbox out or "
           "give one.");
@@ -204,8 +206,8 @@ void BoxControl::aim()
   for (int k = 0; k < 6; ++k) aim(components[k], k < 3);
   const double volume = domain->prd[0] * domain->prd[1] * (dimension == 3 ? domain->prd[2] : 1.0);
   if (measure <= MOST_DENSE * volume) return;
-  error->all(FLERR, "fix overdamped/affine found a packing fraction of " +
-                        shown(measure / volume) + ", expected at most " + shown(MOST_DENSE) +
+  error->all(FLERR, "fix overdamped/affine found a packing fraction of " + shown(measure / volume) +
+                        ", expected at most " + shown(MOST_DENSE) +
                         ": the contacts do not bear the targets, use smaller ones.");
 }
 

@@ -42,7 +42,8 @@ constexpr int N_OF_SUBSTEPS = 8, N_OF_FLOW = 4;
 
 constexpr const char *SYNTAX =
     "'drag k_d [compress kappa] [shear gdot] [pure edot] [gradient ...] [pressure iso START STOP] "
-    "[stress ab P] [tbox T] [volume free|constant] [flip F] [integrator NAME] [tolerance T] [stages MAX] [reference center|corner] [check N]'.";
+    "[stress ab P] [tbox T] [volume free|constant] [flip F] [integrator NAME] [tolerance T] "
+    "[stages MAX] [reference center|corner] [check N]'.";
 
 /// Global data of a restart file. The first number identifies the format.
 constexpr std::uint64_t SAVED_AS = 0x6a616d7368617003, WITHOUT_TIME = SAVED_AS - 1;
@@ -319,8 +320,8 @@ FixOverdampedAffine::~FixOverdampedAffine()
 int FixOverdampedAffine::setmask()
 {
   using namespace LAMMPS_NS::FixConst;
-  return INITIAL_INTEGRATE | (control ? FINAL_INTEGRATE : 0) | POST_NEIGHBOR | MIN_POST_NEIGHBOR | POST_RUN |
-         (domain->triclinic ? PRE_EXCHANGE : 0);
+  return INITIAL_INTEGRATE | (control ? FINAL_INTEGRATE : 0) | POST_NEIGHBOR | MIN_POST_NEIGHBOR |
+         POST_RUN | (domain->triclinic ? PRE_EXCHANGE : 0);
 }
 
 /// Rejects other fixes that move the same particles, and fixes without any effect here.

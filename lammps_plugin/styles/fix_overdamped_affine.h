@@ -20,14 +20,15 @@ namespace jamshape {
 /// velocity gradients: -kappa 1 (Marschall & Teitel 2018, Eqs. 6-14), G_xy = gdot (Marschall, Keta,
 /// Olsson & Teitel, Phys. Rev. Lett. 122, 188002), G_xx = -G_yy = edot, or any without entries
 /// below the diagonal. Components that `pressure` or `stress` control follow the stress of the
-/// contacts instead (BoxControl); targets may be v_name. The box switches to other cell vectors when its tilt exceeds the fraction F
-/// of an edge. Global vector: time since strain 0, strain (mean shrinkage of lengths), largest
-/// relaxation rate, largest stable time step, dissipated power, force evaluations, list rebuilds
-/// inside steps, largest difference of the stages of the last step; of adaptive integrators:
-/// accepted, rejected and forced substeps, the next substep, and of the last step of LAMMPS the
-/// shortest substep, largest local error and most stages; the mean overlap length that errors are
-/// relative to; then the strains of simple and of pure shear, the mean rotation of particles about
-/// z, and the power of torques on the rotation due to the host alone.
+/// contacts instead (BoxControl); targets may be v_name. The box switches to other cell vectors
+/// when its tilt exceeds the fraction F of an edge. Global vector: time since strain 0, strain
+/// (mean shrinkage of lengths), largest relaxation rate, largest stable time step, dissipated
+/// power, force evaluations, list rebuilds inside steps, largest difference of the stages of the
+/// last step; of adaptive integrators: accepted, rejected and forced substeps, the next substep,
+/// and of the last step of LAMMPS the shortest substep, largest local error and most stages; the
+/// mean overlap length that errors are relative to; then the strains of simple and of pure shear,
+/// the mean rotation of particles about z, and the power of torques on the rotation due to the host
+/// alone.
 class FixOverdampedAffine : public LAMMPS_NS::Fix {
  public:
   FixOverdampedAffine(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg);

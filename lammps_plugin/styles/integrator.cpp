@@ -104,8 +104,8 @@ class Rkc2 : public StepControl {
       const RungeKuttaChebyshev::Stage &stage = method.stage[j];
       const Upper before = reached;
       reached = j == method.s ? span.to() : span.deformation(stage.c * h);
-      OverdampedFlow::Move move{h * stage.of_start, h * stage.of_last_rate, before,
-                                reached,            stage.of_last,          stage.of_one_before};
+      OverdampedFlow::Move move{h * stage.of_start, h * stage.of_last_rate, before, reached,
+                                stage.of_last,      stage.of_one_before};
       move.to = reached = set_box(flow, box, move);
       if (!flow.move_by(move)) return INFINITY;
       flow.evaluate_forces();

@@ -105,9 +105,10 @@ template <int D> struct OverdampedFlow::Row {
 OverdampedFlow::OverdampedFlow(LAMMPS_NS::LAMMPS *lmp, double k_d, const AffineBox &affine_box,
                                LAMMPS_NS::Fix *owner, int registers) :
     Pointers(lmp), box(affine_box), dimension(domain->dimension), n_rates(rate_width(dimension)),
-    n_turns(dimension == 2 ? 2 : 4), n_registers(registers), pair(nullptr), control_of_box(nullptr), values(nullptr),
-    can_retry(false), farthest(0.0), turned_so_far(0.0), seen(0.0), largest_difference(0.0),
-    evaluations(0), rebuilds(0), mobilities(lmp, k_d), relaxation(lmp, owner, mobilities)
+    n_turns(dimension == 2 ? 2 : 4), n_registers(registers), pair(nullptr), control_of_box(nullptr),
+    values(nullptr), can_retry(false), farthest(0.0), turned_so_far(0.0), seen(0.0),
+    largest_difference(0.0), evaluations(0), rebuilds(0), mobilities(lmp, k_d),
+    relaxation(lmp, owner, mobilities)
 {
 }
 

@@ -72,8 +72,8 @@ double StepControl::error_of(OverdampedFlow &flow, const OverdampedFlow::Move &s
   const double of_particles = flow.rms_of(sum);
   const BoxControl *const control = flow.control();
   if (!control) return of_particles;
-  return std::hypot(of_particles, now.touching.reach *
-                                      control->length_of(sum.stored, sum.present, sum.last));
+  return std::hypot(of_particles,
+                    now.touching.reach * control->length_of(sum.stored, sum.present, sum.last));
 }
 
 /// Estimates the rate and the overlaps, at a state with forces.

@@ -36,7 +36,9 @@ def fix(control, dt, options="integrator heun"):
 
 def lattice(spacing, n=3):
     """Discs of diameter 1 on a square lattice: no force moves one, however the box changes."""
-    position = spacing * (np.stack(np.unravel_index(np.arange(n * n), (n, n)), axis=1) - n / 2 + 0.5)
+    position = spacing * (
+        np.stack(np.unravel_index(np.arange(n * n), (n, n)), axis=1) - n / 2 + 0.5
+    )
     return rods(position, 0.0, 0.0, 0.5, [n * spacing, n * spacing])
 
 
@@ -126,7 +128,9 @@ def test_at_rest_the_stress_is_the_target(name, goal, start, tmp_path, measured)
     packing, p = start(name), 0.02
     with loaded(packing, tmp_path, sides="two") as session:
         control = f"{all_stresses(packing.dimension, p)} tbox 20"
-        session.commands(f"{TILT}\n{fix(control, 20.0, 'integrator rkc2 tolerance 1e-3')}\n{STRESSES}")
+        session.commands(
+            f"{TILT}\n{fix(control, 20.0, 'integrator rkc2 tolerance 1e-3')}\n{STRESSES}"
+        )
         for _ in range(400):
             session.commands("run 10 post no")
             error = np.abs(tensor(session) - p * np.eye(packing.dimension)).max() / p
@@ -206,7 +210,7 @@ def test_power_balance_in_a_box_that_yields(name, start, tmp_path, measured):
     with loaded(packing, tmp_path, sides="two") as session:
         session.commands(f"{TILT}\n{fix(f'shear {g} stress yy {p} tbox {t_box}', dt)}\n{STRESSES}")
         session.commands("thermo_style custom step pe vol c_stress[1]\nthermo_modify norm no\nrun 400\nrun 0")  # fmt: skip
-        for k in range(801):
+        for _ in range(801):
             P, volume = tensor(session), session.lmp.get_thermo("vol")
             yy = (P[1, 1] - p) * volume / (t_box * packing.n)
             work = -volume * (P[0, 1] * g + P[1, 1] * yy)
@@ -227,7 +231,9 @@ def test_power_balance_in_a_box_that_yields(name, start, tmp_path, measured):
 
 def test_targets_may_be_variables_and_ramps(tmp_path):
     with loaded(lattice(0.99), tmp_path) as session:
-        session.commands(f"variable p equal 0.05\n{fix('pressure iso v_p v_p tbox 20', 0.1)}\nrun 300")
+        session.commands(
+            f"variable p equal 0.05\n{fix('pressure iso v_p v_p tbox 20', 0.1)}\nrun 300"
+        )
         found = state_of(session).packing.box.edges / 3
     np.testing.assert_array_equal(
         found, spacing_after("pressure iso 0.05 0.05 tbox 20", 300, 0.1, "", tmp_path)

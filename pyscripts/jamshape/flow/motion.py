@@ -105,7 +105,9 @@ class Motion(ABC):
         """Controlled stress in the syntax of `fix overdamped/affine`."""
         return ""
 
-    def stresses(self, found: Mapping[str, float], second: float, dimension: int) -> dict[str, float]:
+    def stresses(
+        self, found: Mapping[str, float], second: float, dimension: int
+    ) -> dict[str, float]:
         """Further observables, from the others and the second normal stress difference."""
         del found, second, dimension
         return {}

@@ -142,9 +142,15 @@ class Shear(Shearing):
     @property
     def control(self) -> str:
         """Controlled stress in the syntax of `fix overdamped/affine`."""
-        return "" if self.hold_pressure is None else f" stress yy {self.hold_pressure!r} tbox {self.t_box!r}"
+        return (
+            ""
+            if self.hold_pressure is None
+            else f" stress yy {self.hold_pressure!r} tbox {self.t_box!r}"
+        )
 
-    def stresses(self, found: Mapping[str, float], second: float, dimension: int) -> dict[str, float]:
+    def stresses(
+        self, found: Mapping[str, float], second: float, dimension: int
+    ) -> dict[str, float]:
         """Return the normal pressure, where it is controlled."""
         if self.hold_pressure is None:
             return {}

@@ -149,7 +149,10 @@ def shear(
     at = place(file, "shear.h5")
     whole = dt is None and sides == 2
     if pressure:
-        held = {"hold_pressure": pressure, "t_box": max(1.0, 0.01 / gdot) if t_box is None else t_box}
+        held = {
+            "hold_pressure": pressure,
+            "t_box": max(1.0, 0.01 / gdot) if t_box is None else t_box,
+        }
         integrator = integrator or ("rkc2" if whole else "heun")
         _require_yielding(integrator, flow)
     else:

@@ -18,7 +18,9 @@ def test_the_normal_pressure_is_held_and_the_height_follows(tmp_path):
     found = run.steady(after=1.0)
     assert found["p_yy"].value == pytest.approx(1e-2, rel=0.1)
     assert 0.05 < found["friction"].value < 1
-    assert found["friction"].value == pytest.approx(found["shear_stress"].value / found["p_yy"].value)
+    assert found["friction"].value == pytest.approx(
+        found["shear_stress"].value / found["p_yy"].value
+    )
     assert found["phi"].value == pytest.approx(run["phi"].mean(), rel=0.05)
     assert run["phi"].std() > 0
     assert run.strain[-1] == pytest.approx(4, rel=1e-9)
