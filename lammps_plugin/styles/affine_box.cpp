@@ -25,7 +25,8 @@ Vec<3> vec3(const double *from) { return {{from[0], from[1], from[2]}}; }
 
 AffineBox::AffineBox(LAMMPS_NS::LAMMPS *lmp, const Upper &gradient, Reference fixed_point) :
     Pointers(lmp), fixed(fixed_point), dimension(domain->dimension), now{}, next_rate(gradient),
-    time_base(0.0), reached_step(update->ntimestep), started(false), left{}
+    time_base(0.0), late(0.0), reached_step(update->ntimestep), started(false), yields(false),
+    left{}
 {
   now.rate = gradient;
 }
@@ -40,6 +41,7 @@ AffineBox::State AffineBox::saved_state() const
 void AffineBox::restore(const State &from, double time_until_base)
 {
   now = from;
+  late = 0.0;
   time_base = time_until_base;
   reached_step = update->ntimestep;
   started = from.dt != 0.0;  // the fix had run
@@ -52,7 +54,7 @@ bool AffineBox::begin_run(bigint step)
   const bool was_started = started, continues = started && is_in_box(bounds(deformation(step)));
   if (continues) {
     follow_timestep();
-    if (!(now.rate == next_rate)) follow_gradient(step);
+    if (!yields && !(now.rate == next_rate)) follow_gradient(step);
   } else {
     start_here(step);
   }
@@ -95,7 +97,7 @@ bool AffineBox::is_in_box(const Bounds &at) const
 void AffineBox::start_here(bigint step)
 {
   now = State{};
-  time_base = 0.0;
+  time_base = late = 0.0;
   for (int k = 0; k < 3; ++k) {
     now.lo[k] = domain->boxlo[k];
     now.hi[k] = domain->boxhi[k];
@@ -109,10 +111,10 @@ void AffineBox::start_here(bigint step)
   now.step_base = step;
 }
 
-void AffineBox::go_on_from(bigint step)
+void AffineBox::go_on_from(bigint step, double after)
 {
-  const double passed = elapsed(step);
-  const Upper present = deformation(step);
+  const double passed = elapsed(step) + after;
+  const Upper present = deformation(step, after);
   now.stretch_base = stretch(passed);
   time_base += passed;
   const double shears[3] = {present.xy, present.xz, present.yz};
@@ -123,12 +125,36 @@ void AffineBox::go_on_from(bigint step)
   }
   now.flips = {0.0, 0.0, 0.0};
   now.step_base = step;
+  late = after;
+}
+
+Upper AffineBox::moved(const Upper &omega) const
+{
+  Upper found = exponential(omega) * unflipped(0.0);
+  for (int k = 0; k < 3; ++k) {
+    found.diagonal[k] = std::exp(now.stretch_base[k] + omega.diagonal[k]);
+  }
+  return found;
+}
+
+void AffineBox::settle(bigint step, double after, const Motion &by)
+{
+  const Upper present = moved(by.omega);
+  now.stretch_base = now.stretch_base + by.omega.diagonal;
+  time_base += by.h;
+  const double shears[3] = {present.xy, present.xz, present.yz};
+  for (int k = 0; k < 3; ++k) {
+    now.base[k] = shears[k];
+    now.sheared[k] += by.sheared[k];
+  }
+  now.step_base = step;
+  late = after;
 }
 
 /// Time since `step_base`.
 double AffineBox::elapsed(bigint step) const
 {
-  return static_cast<double>(step - now.step_base) * now.dt;
+  return static_cast<double>(step - now.step_base) * now.dt - late;
 }
 
 double AffineBox::time(bigint step) const { return time_base + elapsed(step); }
@@ -160,9 +186,8 @@ double AffineBox::pure_strain(bigint step) const
   return 0.5 * (log[0] - log[1]);
 }
 
-double AffineBox::speed() const
+double AffineBox::speed_of(const Upper &g)
 {
-  const Upper &g = now.rate;
   const Vec<3> &d = g.diagonal;
   return std::max({std::abs(d[0]) + std::abs(g.xy) + std::abs(g.xz),
                    std::abs(d[1]) + std::abs(g.yz), std::abs(d[2])});

@@ -64,7 +64,8 @@ class AffineBox : protected LAMMPS_NS::Pointers {
   double shear_strain(LAMMPS_NS::bigint step) const;
   double pure_strain(LAMMPS_NS::bigint step) const;
   /// Strain rate of the flow: the largest sum of a row of |G|.
-  double speed() const;
+  double speed() const { return speed_of(now.rate); }
+  static double speed_of(const Upper &gradient);
   /// Whether it only shrinks or expands the box, isotropically.
   bool is_isotropic() const;
 
@@ -72,6 +73,22 @@ class AffineBox : protected LAMMPS_NS::Pointers {
   Upper deformation(LAMMPS_NS::bigint step, double time_after = 0.0) const;
   /// Sets LAMMPS's box to that of a deformation.
   void set_box(const Upper &deformation);
+
+  /* a box that yields: its rate changes from stage to stage */
+
+  /// Continues from the deformation at a time after a step.
+  void go_on_from(LAMMPS_NS::bigint step, double after = 0.0);
+  void let_yield() { yields = true; }
+  void set_rate(const Upper &gradient) { now.rate = gradient; }
+  /// exp(omega) times the deformation that it went on from.
+  Upper moved(const Upper &omega) const;
+  struct Motion {
+    Upper omega;
+    Vec<3> sheared;  // integrals of G_xy, G_xz and G_yz
+    double h;        // time
+  };
+  /// Makes the box after a motion the state at a time after a step.
+  void settle(LAMMPS_NS::bigint step, double after, const Motion &by);
 
   /// Flips that remove a tilt of more than `most` of the edge that it goes along.
   Flip flip_needed(LAMMPS_NS::bigint step, double most) const;
@@ -120,8 +137,9 @@ class AffineBox : protected LAMMPS_NS::Pointers {
   State now;
   Upper next_rate;   // G from the start of the next run
   double time_base;  // since strain 0, at step_base
+  double late;       // of that base, after step_base: within a step only
   LAMMPS_NS::bigint reached_step;
-  bool started;
+  bool started, yields;
   Bounds left;
 
   /// Signed image counts from LAMMPS's packed ones.
@@ -141,7 +159,6 @@ class AffineBox : protected LAMMPS_NS::Pointers {
   Vec<3> stretch(double passed) const;
   Upper unflipped(double passed) const;
   Upper flips_in_reference(const Flip &by) const;
-  void go_on_from(LAMMPS_NS::bigint step);
   void follow_gradient(LAMMPS_NS::bigint step);
   void start_here(LAMMPS_NS::bigint step);
 };

@@ -3,6 +3,7 @@
 #include "atom.h"
 #include "comm.h"
 #include "compat.h"
+#include "compute.h"
 #include "domain.h"
 #include "error.h"
 #include "force.h"
@@ -40,8 +41,9 @@ constexpr double LARGEST_STRAIN = 1.0;
 constexpr int N_OF_SUBSTEPS = 8, N_OF_FLOW = 4;
 
 constexpr const char *SYNTAX =
-    "'drag k_d [compress kappa] [shear gdot] [pure edot] [gradient ...] [volume free|constant] "
-    "[flip F] [integrator NAME] [tolerance T] [stages MAX] [reference center|corner] [check N]'.";
+    "'drag k_d [compress kappa] [shear gdot] [pure edot] [gradient ...] [pressure iso START STOP] "
+    "[stress ab P] [tbox T] [volume free|constant] [flip F] [integrator NAME] [tolerance T] "
+    "[stages MAX] [reference center|corner] [check N]'.";
 
 /// Global data of a restart file. The first number identifies the format.
 constexpr std::uint64_t SAVED_AS = 0x6a616d7368617003, WITHOUT_TIME = SAVED_AS - 1;
@@ -102,18 +104,30 @@ FixOverdampedAffine::Command FixOverdampedAffine::read(int narg, char **arg)
     fail(std::string("wrong arguments, expected ") + SYNTAX);
   }
   Command command;
+  control = std::make_unique<BoxControl>(lmp);
   command.k_d = number(arg[4]);
   if (!(command.k_d > 0.0) || !std::isfinite(command.k_d)) {
     fail(std::string("drag ") + arg[4] + ", expected a positive number.");
   }
   for (int k = 5; k < narg;) {
-    const int taken = read_flow(k, narg, arg, command);
+    int taken = read_flow(k, narg, arg, command);
+    if (taken == 0) taken = read_control(k, narg, arg);
     if (taken == 0 && k + 1 >= narg) fail(std::string("'") + arg[k] + "', expected " + SYNTAX);
     if (taken == 0) read_option(arg[k], arg[k + 1], command);
     k += taken > 0 ? taken : 2;
   }
   if (command.holds_volume) require_no_trace(command.gradient);
   return command;
+}
+
+/// Reads a keyword of the control of stress, as read_flow.
+int FixOverdampedAffine::read_control(int k, int narg, char **arg)
+{
+  try {
+    return control->read(k, narg, arg);
+  } catch (const std::invalid_argument &problem) {
+    fail(problem.what());
+  }
 }
 
 void FixOverdampedAffine::require_no_trace(const Upper &gradient) const
@@ -224,6 +238,51 @@ void FixOverdampedAffine::make_parts(const Command &of)
   }
   flow = std::make_unique<OverdampedFlow>(lmp, of.k_d, *box, this, integrator->n_registers());
   if (integrator->state()) flow->allow_retries();
+  make_control(of);
+}
+
+/// Lets the box yield if a component of the stress is controlled.
+void FixOverdampedAffine::make_control(const Command &of)
+{
+  try {
+    control->require_complete(of.holds_volume);
+    control->drive(of.gradient);
+  } catch (const std::invalid_argument &problem) {
+    fail(problem.what());
+  }
+  if (!control->is_on()) {
+    control.reset();
+    return;
+  }
+  if (control->shears() && !domain->triclinic) {
+    fail("a box without tilt, expected one that shear can tilt: use 'change_box all triclinic'.");
+  }
+  control->yield(*box);
+  flow->yield_by(control.get());
+  // LAMMPS sums the virial on the steps that a compute of the pressure asks for.
+  modify->add_compute(std::string(id) + "_stress all pressure NULL virial");
+}
+
+void FixOverdampedAffine::need_virial(bigint step)
+{
+  const int which = modify->find_compute(std::string(id) + "_stress");
+  if (which < 0) {
+    flow->stop("found no compute " + std::string(id) +
+               "_stress, expected the one that the fix made: leave out its 'uncompute'.");
+  }
+  modify->compute[which]->addstep(step);
+}
+
+/// Sets the rates of the box to those of the stress and the targets at LAMMPS's own forces.
+void FixOverdampedAffine::follow_stress(bigint step)
+{
+  control->aim();
+  need_virial(update->ntimestep + 1);
+  if (update->vflag_global == step) {
+    control->follow();
+  } else {
+    flow->evaluate_forces();
+  }
 }
 
 /// Sets the members that LAMMPS reads.
@@ -253,6 +312,7 @@ void FixOverdampedAffine::tell_what_this_is()
 FixOverdampedAffine::~FixOverdampedAffine()
 {
   if (copymode) return;
+  if (control) modify->delete_compute(std::string(id) + "_stress");
   atom->delete_callback(id, LAMMPS_NS::Atom::GROW);
   atom->delete_callback(id, LAMMPS_NS::Atom::RESTART);
 }
@@ -260,8 +320,8 @@ FixOverdampedAffine::~FixOverdampedAffine()
 int FixOverdampedAffine::setmask()
 {
   using namespace LAMMPS_NS::FixConst;
-  return INITIAL_INTEGRATE | POST_NEIGHBOR | MIN_POST_NEIGHBOR | POST_RUN |
-         (domain->triclinic ? PRE_EXCHANGE : 0);
+  return INITIAL_INTEGRATE | (control ? FINAL_INTEGRATE : 0) | POST_NEIGHBOR | MIN_POST_NEIGHBOR |
+         POST_RUN | (domain->triclinic ? PRE_EXCHANGE : 0);
 }
 
 /// Rejects other fixes that move the same particles, and fixes without any effect here.
@@ -306,6 +366,12 @@ int FixOverdampedAffine::modify_param(int narg, char **arg)
   require_cell(command.gradient);
   if (holds_volume) require_no_trace(command.gradient);
   box->change_gradient(command.gradient);
+  if (!control) return k;
+  try {
+    control->drive(command.gradient);
+  } catch (const std::invalid_argument &problem) {
+    fail(problem.what());
+  }
   return k;
 }
 
@@ -393,7 +459,9 @@ void FixOverdampedAffine::take_up(bigint from)
 
 void FixOverdampedAffine::require_timestep() const
 {
-  const double strain = box->speed() * update->dt;
+  // That of a box that yields is judged step by step.
+  const double speed = control ? AffineBox::speed_of(control->driven()) : box->speed();
+  const double strain = speed * update->dt;
   if (!(update->dt > 0.0)) {
     flow->stop("found timestep " + shown(update->dt) +
                ", expected a positive one: to open the box, give 'compress' a negative rate.");
@@ -421,7 +489,8 @@ void FixOverdampedAffine::tell_what_is_left_out()
 {
   if (comm->me != 0 || was_told) return;
   was_told = true;
-  std::string text = "energy and virial of stages within steps";
+  std::string text =
+      control ? "energy of stages within steps" : "energy and virial of stages within steps";
   if (!integrator->state()) text += ", second derivatives";
   LAMMPS_NS::utils::logmesg(
       lmp, "fix overdamped/affine: skipped, because this run does not need it: " + text + "\n");
@@ -448,6 +517,7 @@ void FixOverdampedAffine::setup(int)
 {
   if (update->whichflag != 1) return;
   next_check = update->ntimestep;
+  if (control) follow_stress(update->ntimestep);
   check_stability(update->ntimestep);
   integrator->begin_run(*flow);
 }
@@ -456,6 +526,10 @@ void FixOverdampedAffine::initial_integrate(int)
 {
   const bigint to = update->ntimestep, from = to - 1;
   take_up(from);
+  if (control) {
+    follow_stress(from);
+    if (!integrator->state()) require_strain(box->speed() * update->dt);
+  }
   if (from >= next_check) check_stability(from);
   flow->count_evaluation();  // LAMMPS's own, at the end of the last step
   inside_step = true;
@@ -464,6 +538,9 @@ void FixOverdampedAffine::initial_integrate(int)
   box->reach(to);
   ask_for_flip();
 }
+
+/// For output: the rate of the box at the end of the step.
+void FixOverdampedAffine::final_integrate() { control->follow(); }
 
 /// Atoms change their images with the cell, which is possible only when LAMMPS builds its lists.
 void FixOverdampedAffine::ask_for_flip()
@@ -509,6 +586,7 @@ void FixOverdampedAffine::check_stability(bigint step)
                            ? static_cast<bigint>(until_strained)
                            : check_every);
   largest_rate = flow->largest_rate_of_bonds();
+  if (control) largest_rate += control->largest_rate();
   const double limit = largest_stable_dt();
   if (update->dt <= NEAR_LIMIT * limit) {
     warned = false;

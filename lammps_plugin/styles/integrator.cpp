@@ -23,11 +23,16 @@ class Heun : public Integrator {
 
   void step(OverdampedFlow &flow, LAMMPS_NS::bigint step, double dt) override
   {
-    const Upper from = box.deformation(step - 1), to = box.deformation(step);
-    box.set_box(to);
-    flow.start_by({dt, 0.0, from, to});
+    BoxControl *const control = flow.control();
+    if (control) control->hold(step - 1, 0.0);
+    OverdampedFlow::Move euler{dt, 0.0, box.deformation(step - 1), box.deformation(step)};
+    euler.to = set_box(flow, box, euler);
+    flow.start_by(euler);
     flow.evaluate_forces();
-    flow.finish_step({0.5 * dt, 0.5 * dt, to, to});
+    OverdampedFlow::Move mean{0.5 * dt, 0.5 * dt, euler.to, euler.to};
+    mean.to = set_box(flow, box, mean);
+    flow.finish_step(mean);
+    if (control) control->settle(step, 0.0, dt);
   }
 
   double stability_interval() const override { return 2.0; }
@@ -46,21 +51,26 @@ class HeunEuler : public StepControl {
 
  private:
   static constexpr double STAGES = 2.0;
+  Upper tried{};  // deformation of the last attempt
 
   double order_of_error() const override { return 2.0; }
   double stages(double) const override { return STAGES; }
 
   double attempt(OverdampedFlow &flow, const Span &span) override
   {
-    box.set_box(span.to());
-    if (!flow.move_by({span.h, 0.0, span.from(), span.to()})) return INFINITY;
+    const double h = span.h;
+    OverdampedFlow::Move euler{h, 0.0, span.from(), span.to()};
+    euler.to = tried = set_box(flow, box, euler);
+    if (!flow.move_by(euler)) return INFINITY;
     flow.evaluate_forces();
-    return flow.rms_of({-0.5 * span.h, 0.5 * span.h, span.to(), span.to()});
+    return error_of(flow, {-0.5 * h, 0.5 * h, tried, tried});
   }
 
   void finish(OverdampedFlow &flow, const Span &span) override
   {
-    flow.finish_step({0.5 * span.h, 0.5 * span.h, span.to(), span.to()});
+    OverdampedFlow::Move mean{0.5 * span.h, 0.5 * span.h, tried, tried};
+    mean.to = set_box(flow, box, mean);
+    flow.finish_step(mean);
   }
 
   bool has_forces_at_end() const override { return false; }
@@ -80,6 +90,7 @@ class Rkc2 : public StepControl {
 
  private:
   const int most;
+  Upper tried{};  // deformation of the last attempt
 
   double order_of_error() const override { return 3.0; }
   double stages(double z) const override { return RungeKuttaChebyshev::stages(z, most); }
@@ -93,18 +104,19 @@ class Rkc2 : public StepControl {
       const RungeKuttaChebyshev::Stage &stage = method.stage[j];
       const Upper before = reached;
       reached = j == method.s ? span.to() : span.deformation(stage.c * h);
-      box.set_box(reached);
-      const bool fits = flow.move_by({h * stage.of_start, h * stage.of_last_rate, before, reached,
-                                      stage.of_last, stage.of_one_before});
-      if (!fits) return INFINITY;
+      OverdampedFlow::Move move{h * stage.of_start, h * stage.of_last_rate, before, reached,
+                                stage.of_last,      stage.of_one_before};
+      move.to = reached = set_box(flow, box, move);
+      if (!flow.move_by(move)) return INFINITY;
       flow.evaluate_forces();
     }
-    return flow.rms_of({0.4 * h, 0.4 * h, span.to(), span.to(), -0.8, 0.0});
+    tried = reached;
+    return error_of(flow, {0.4 * h, 0.4 * h, tried, tried, -0.8, 0.0});
   }
 
-  void finish(OverdampedFlow &flow, const Span &span) override
+  void finish(OverdampedFlow &flow, const Span &) override
   {
-    flow.finish_step({0.0, 0.0, span.to(), span.to(), 1.0, 0.0});
+    flow.finish_step({0.0, 0.0, tried, tried, 1.0, 0.0});
   }
 
   bool has_forces_at_end() const override { return true; }
@@ -162,6 +174,15 @@ const std::map<std::string, std::unique_ptr<Integrator> (*)(AffineBox &, const I
 };
 
 }  // namespace
+
+Upper Integrator::set_box(const OverdampedFlow &flow, AffineBox &box,
+                          const OverdampedFlow::Move &by)
+{
+  BoxControl *const control = flow.control();
+  const Upper to = control ? control->moved(by.stored, by.present, by.last, by.before) : by.to;
+  box.set_box(to);
+  return to;
+}
 
 std::unique_ptr<Integrator> make_integrator(const std::string &name, AffineBox &box,
                                             const IntegratorOptions &options)

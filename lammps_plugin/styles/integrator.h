@@ -53,6 +53,11 @@ class Integrator {
   virtual StepReport report() const { return {}; }
   /// Makes the estimates needed by the first step.
   virtual void begin_run(OverdampedFlow & /*flow*/) {}
+
+ protected:
+  /// Sets the box of a stage, and returns its deformation: that at its time, or, where the box
+  /// yields, by the same sum of rates as the particles.
+  static Upper set_box(const OverdampedFlow &flow, AffineBox &box, const OverdampedFlow::Move &by);
 };
 
 /// Returns null if no integrator has this name. Throws std::invalid_argument with a message about

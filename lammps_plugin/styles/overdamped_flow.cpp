@@ -38,6 +38,9 @@ double step_limit(const Mobilities::Mobility &of) { return LARGEST_STEP * of.sho
 /// The same, over LARGEST_STEP, if a shorter step may be tried instead.
 constexpr double LARGEST_TRIAL = 0.5;
 
+/// LAMMPS's flag of a virial by pairs.
+constexpr int VIRIAL_OF_PAIRS = 1;
+
 /// Coordinates that agree with the atom's position to this fraction of the box are valid.
 constexpr double SAME_POSITION = 1e-13;
 
@@ -102,9 +105,10 @@ template <int D> struct OverdampedFlow::Row {
 OverdampedFlow::OverdampedFlow(LAMMPS_NS::LAMMPS *lmp, double k_d, const AffineBox &affine_box,
                                LAMMPS_NS::Fix *owner, int registers) :
     Pointers(lmp), box(affine_box), dimension(domain->dimension), n_rates(rate_width(dimension)),
-    n_turns(dimension == 2 ? 2 : 4), n_registers(registers), pair(nullptr), values(nullptr),
-    can_retry(false), farthest(0.0), turned_so_far(0.0), seen(0.0), largest_difference(0.0),
-    evaluations(0), rebuilds(0), mobilities(lmp, k_d), relaxation(lmp, owner, mobilities)
+    n_turns(dimension == 2 ? 2 : 4), n_registers(registers), pair(nullptr), control_of_box(nullptr),
+    values(nullptr), can_retry(false), farthest(0.0), turned_so_far(0.0), seen(0.0),
+    largest_difference(0.0), evaluations(0), rebuilds(0), mobilities(lmp, k_d),
+    relaxation(lmp, owner, mobilities)
 {
 }
 
@@ -117,6 +121,7 @@ OverdampedFlow::~OverdampedFlow() { memory->sfree(values); }
 bool OverdampedFlow::begin_run()
 {
   pair = &PairContact::of(lmp, "fix overdamped/affine");
+  if (control_of_box) control_of_box->begin_run(*pair);
   measure_particles();
   double moved = 0.0;
   in_dimension(dimension, [&](auto D) {
@@ -454,10 +459,11 @@ void OverdampedFlow::evaluate_forces()
     comm->forward_comm();
   }
   clear_forces();
-  const int no_energy = 0, no_virial = 0;
+  const int no_energy = 0, virial = control_of_box ? VIRIAL_OF_PAIRS : 0, no_virial = 0;
   if (modify->n_pre_force) modify->pre_force(no_virial);
-  force->pair->compute(no_energy, no_virial);
+  force->pair->compute(no_energy, virial);
   if (force->newton) comm->reverse_comm();
+  if (control_of_box) control_of_box->follow();
   if (compat::has_post_force(modify)) modify->post_force(no_virial);
   ++evaluations;
 }

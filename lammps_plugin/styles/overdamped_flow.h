@@ -4,6 +4,7 @@
 #include "contact/math/vec.hpp"
 
 #include "affine_box.h"
+#include "box_control.h"
 #include "fix.h"
 #include "mobility.h"
 #include "relaxation_rate.h"
@@ -37,6 +38,9 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   /// Strain of a step that pushes touching particles into each other by half their radius, the
   /// largest displacement allowed in a step; over all particles, after `begin_run`.
   double largest_strain() const;
+  /// Lets the box yield to the stress of every evaluation.
+  void yield_by(BoxControl *to) { control_of_box = to; }
+  BoxControl *control() const { return control_of_box; }
   /// Reads the sizes of own atoms; after every exchange of atoms.
   void measure_particles() { mobilities.measure(*pair); }
 
@@ -141,6 +145,7 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   const AffineBox &box;
   const int dimension, n_rates, n_turns, n_registers;
   PairContact *pair;
+  BoxControl *control_of_box;
   // Per atom: coordinates, rates of the stored stage, orientation at the step's start, registers
   // (displacements of the last move and of the one before).
   double *values;

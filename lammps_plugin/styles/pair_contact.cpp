@@ -325,6 +325,17 @@ void PairContact::setup()
   }
 }
 
+double PairContact::largest_energy() const
+{
+  double largest = 0.0;
+  for (int i = 1; i <= atom->ntypes; ++i) {
+    for (int j = i; j <= atom->ntypes; ++j) {
+      if (setflag[i][j]) largest = std::max(largest, k_e[i][j]);
+    }
+  }
+  return largest;
+}
+
 double PairContact::largest_reach() const
 {
   double largest = 0.0;

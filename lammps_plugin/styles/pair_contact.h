@@ -99,6 +99,9 @@ class PairContact : public LAMMPS_NS::Pair {
   /// Each bond once over all ranks and with tag[i] <= tag[j].
   std::vector<LocalBond> reported_bonds();
 
+  /// Largest stiffness of a contact, over all pairs of types.
+  double largest_energy() const;
+
   const ParticleView &particle_view() const { return particles; }
 
  protected:

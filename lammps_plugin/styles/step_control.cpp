@@ -56,11 +56,24 @@ void StepControl::step(OverdampedFlow &flow, bigint to, double dt)
   Span left{box, to - 1, 0.0, dt, true, 0.0};
   while (left.h > 0.0) {
     refresh(flow);
+    BoxControl *const control = flow.control();
+    if (control) control->hold(to - 1, left.begin);
     flow.hold_start(left.from());
     const double h = substep(flow, left);
-    left.begin = h == left.h ? dt : left.begin + h;
+    const bool ends = h == left.h;
+    left.begin = ends ? dt : left.begin + h;
     left.h = dt - left.begin;
+    if (control) control->settle(ends ? to : to - 1, ends ? 0.0 : left.begin, h);
   }
+}
+
+double StepControl::error_of(OverdampedFlow &flow, const OverdampedFlow::Move &sum) const
+{
+  const double of_particles = flow.rms_of(sum);
+  const BoxControl *const control = flow.control();
+  if (!control) return of_particles;
+  return std::hypot(of_particles,
+                    now.touching.reach * control->length_of(sum.stored, sum.present, sum.last));
 }
 
 /// Estimates the rate and the overlaps, at a state with forces.
@@ -76,6 +89,7 @@ void StepControl::refresh(OverdampedFlow &flow)
   if (begins || unknown || now.rate_age >= REFRESH * now.rate_cost) {
     const bigint start = flow.n_evaluations();
     now.rate = flow.largest_rate(ERROR_OF_RATE);
+    if (flow.control()) now.rate += flow.control()->largest_rate();
     now.rate_cost = std::max<bigint>(flow.n_evaluations() - start, 1);
     now.rate_age = 0;
   }
@@ -125,6 +139,7 @@ double StepControl::substep(OverdampedFlow &flow, const Span &left)
       return span.h;
     }
     ++now.rejected;
+    if (flow.control()) flow.control()->try_again();
     const double cut = std::pow(error / TARGET, -1.0 / order_of_error());
     now.h = span.h * std::clamp(std::isfinite(error) ? cut : 0.0, SMALLEST_CUT, LARGEST_CUT);
     if (std::isfinite(error)) now.h = std::max(now.h, smallest_step());

@@ -34,6 +34,10 @@ class StepControl : public Integrator {
 
   AffineBox &box;
 
+  /// Error of a sum of rates: of the particles, and of the strain of a box that yields times the
+  /// distance of first touch.
+  double error_of(OverdampedFlow &flow, const OverdampedFlow::Move &sum) const;
+
  private:
   const double tolerance;
   StepState now;

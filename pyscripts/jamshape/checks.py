@@ -183,6 +183,7 @@ RANGES = {
     "hold_pressure": Range(1e-12, 1.0, "a pressure", also=(0.0,)),
     "phi": Range(1e-6, 2.0, "a packing fraction"),
     "dt": Range(1e-6, 10.0, "a time step"),
+    "t_box": Range(1e-3, 1e18, "a time"),
     "phi_start": Range(1e-9, 0.999, "a packing fraction"),
     "phi_end": Range(1e-6, 2.0, "a packing fraction"),
     "p_end": Range(1e-12, 1.0, "a pressure"),

@@ -218,6 +218,9 @@ CASES = DRIVERS | {
         "compress", BODIES, {"dimension": 3, "n": 8, "phi": (0.2, 0.7), "kappa": 2e-3, **_ROWS}
     ),
     "shear in space": Case("shear", "bodies", {"gdot": 1e-2, "strain": 0.9, **_ROWS}),
+    "shear in LAMMPS at a pressure": Case(
+        "shear", "rods", {"gdot": 1e-2, "strain": 1.2, "pressure": 1e-2, "t_box": 20.0, **_ROWS}
+    ),
     "pure shear in LAMMPS": Case(
         "shear", "dimers", {"gdot": 1e-2, "strain": 0.5, "flow": "pure", "dt": 0.1, **_ROWS}
     ),

@@ -81,6 +81,18 @@ def test_pictures_of_rotation_and_contact_angles(report, runs, tmp_path):
     image(tmp_path / "a.png")
 
 
+def test_viscous_number_makes_its_runs_once(report, tmp_path):
+    words = ["--alphas", 0, "--rates", 1e-2, 3e-3, "--n", 16, "--strain", 1, "--pressure", 1e-2]
+    where = ["--folder", tmp_path / "runs", "--out", tmp_path / "J.png"]
+    found = report(f"{FOLDER}/viscous_number.py", *words, *where)
+    fast, slow = found["points"]
+    assert fast["J"] > slow["J"] > 0
+    assert fast["friction"] > 0
+    assert fast["phi"] < slow["phi"] + 0.1
+    image(tmp_path / "J.png")
+    assert report(f"{FOLDER}/viscous_number.py", *words, *where) == found
+
+
 @pytest.mark.parametrize(
     "name", ["rheology", "flow_curves", "class_stress", "rotation", "contact_angles"]
 )

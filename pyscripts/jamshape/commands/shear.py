@@ -1,13 +1,13 @@
-"""Shear particles of any shape at a constant rate and packing fraction; record stress and snapshots in one H5MD file.
+"""Shear particles of any shape at a constant rate and packing fraction, or pressure; record it in one H5MD file.
 
     jamshape shear --alpha 4 --n 256 --phi 0.8 --gdot 1e-4 --strain 5 --out shear.h5
 
 Starts from a random packing compressed fast to --phi, or from the last frame of a file with particles
-(--start), or that of --frame. The last line of standard output is one JSON object with averages over the steady state, each with its
-error and its correlation strain (memory); they exclude the start-up, which the file
-includes. --after sets the strain at which averaging begins. The same command resumes an interrupted run and reports
-a finished one; it refuses a file with other settings, unless --again replaces it. With --seconds it stops in time,
-before a queue ends it: the exit code is then 75.
+(--start), or that of --frame. With --pressure the height of the box yields to that normal pressure. The last line of
+standard output is one JSON object with averages over the steady state, each with its error and its correlation strain
+(memory); they exclude the start-up, which the file includes. --after sets the strain at which averaging begins. The
+same command resumes an interrupted run and reports a finished one; it refuses a file with other settings, unless
+--again replaces it. With --seconds it stops in time, before a queue ends it: the exit code is then 75.
 """
 
 from __future__ import annotations

@@ -23,7 +23,8 @@ EVALUATIONS_PER_MARK = 2000
 """Least number of evaluations of all forces between marks, next to which building neighbour lists anew is cheap."""
 
 
-_ARGUMENTS = {"strain_end": "strain", "phi_sheared": "phi", "tolerance": "integration_tolerance"}
+_ARGUMENTS = {"strain_end": "strain", "phi_sheared": "phi", "tolerance": "integration_tolerance",
+              "hold_pressure": "pressure"}  # fmt: skip
 
 
 def plan(
@@ -60,7 +61,8 @@ def plan(
     def restore(first: Packing, checkpoint: Checkpoint) -> LammpsDriver:
         return driver(first, settings, sizes, checkpoint or None)
 
-    told = dataclasses.asdict(settings) | dict(made_from) | dataclasses.asdict(sizes)
+    own = {name: value for name, value in dataclasses.asdict(settings).items() if value is not None}
+    told = own | dict(made_from) | dataclasses.asdict(sizes)
     told["dt"] = told.pop("dt")  # may follow from the others
     return Plan(settings.name, f"a {settings.name}", told, begin, restore, _ARGUMENTS)
 

@@ -26,6 +26,7 @@ _PACKING = {
     "phi": 0, "u": 1, "pressure": 2, "z": 3, "S_2": 4, "S_4": 5, "fmax": 6, "frms": 7,
     "z_single": 8, "rattlers": 9, "bonds": 10, "overlap": 11, "tmax": 12,
 }  # fmt: skip
+_SECOND = 20  # normal stress difference p_yy - p_zz
 _FLOW = {"strain": 1, "lambda_max": 2, "dt_max": 3, "evaluations": 5, "step_error": 7}
 _SUBSTEPS = {"substeps": 8, "rejected": 9, "forced": 10, "substep": 11, "substep_shortest": 12,
              "local_error": 13, "stages": 14, "overlap_length": 15}  # fmt: skip
@@ -98,6 +99,18 @@ class Motion(ABC):
     @abstractmethod
     def gradient(self) -> str:
         """Velocity gradient in the syntax of `fix overdamped/affine`."""
+
+    @property
+    def control(self) -> str:
+        """Controlled stress in the syntax of `fix overdamped/affine`."""
+        return ""
+
+    def stresses(
+        self, found: Mapping[str, float], second: float, dimension: int
+    ) -> dict[str, float]:
+        """Further observables, from the others and the second normal stress difference."""
+        del found, second, dimension
+        return {}
 
     def gradient_at(self, step: int) -> str:
         """Velocity gradient of the steps that follow one."""
@@ -199,7 +212,7 @@ class FlowRun(Generic[_Motion]):
     def _fix(self) -> str:
         s = self.settings
         return (
-            f"fix flow all overdamped/affine drag {s.k_d!r} {s.gradient_at(self.session.step)}"
+            f"fix flow all overdamped/affine drag {s.k_d!r} {s.gradient_at(self.session.step)}{s.control}"
             f" integrator {s.integrator}"
             f"{f' tolerance {s.tolerance!r}' if s.chooses_steps else ''}"
         )
@@ -259,6 +272,8 @@ class FlowRun(Generic[_Motion]):
         with one_at_a_time():
             values = lmp.extract_compute("packing", 0, 1)
             found = {name: float(values[k]) for name, k in self.settings.of_packing.items()}
+            second, dimension = float(values[_SECOND]), lmp.extract_setting("dimension")
+            found |= self.settings.stresses(found, second, dimension)
             found |= {name: float(lmp.extract_fix("flow", 0, 1, k)) for name, k in flow.items()}
         found["evaluations"] += self._evaluations
         return found

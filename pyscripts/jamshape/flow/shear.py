@@ -1,4 +1,4 @@
-"""Shear at a constant rate and packing fraction, driven in LAMMPS (Marschall, Keta, Olsson & Teitel 2019)."""
+"""Shear at a constant rate and packing fraction or normal pressure, driven in LAMMPS (Marschall, Keta, Olsson & Teitel 2019)."""
 
 from __future__ import annotations
 
@@ -101,6 +101,10 @@ class Shear(Shearing):
         Final strain, the rate times the time since the start.
     flow
         One of `FLOWS`.
+    hold_pressure
+        Normal pressure p_yy that the height of the box holds, [energy / length^D]; None holds the volume.
+    t_box
+        Time in which the height relaxes, [time]; with a pressure.
 
     Others as in `Motion`.
 
@@ -114,14 +118,44 @@ class Shear(Shearing):
     gdot: float = 1e-4
     strain_end: float = 5.0
     flow: str = "simple"
+    hold_pressure: float | None = None
+    t_box: float | None = None
 
     name: ClassVar[str] = "shear"
 
     def __post_init__(self) -> None:
         require_positive(gdot=self.gdot, strain_end=self.strain_end)
+        if self.hold_pressure is not None and self.t_box is not None:
+            require_positive(hold_pressure=self.hold_pressure, t_box=self.t_box)
+            object.__setattr__(self, "hold_pressure", float(self.hold_pressure))
+            object.__setattr__(self, "t_box", float(self.t_box))
+            if self.flow != "simple":
+                msg = f"flow {self.flow} drives the height of the box, which a pressure needs, expected flow simple or no pressure"
+                raise ValueError(msg)
+        elif self.hold_pressure is not None or self.t_box is not None:
+            msg = f"pressure {self.hold_pressure} and t_box {self.t_box}, expected both or neither"
+            raise ValueError(msg)
         if self.flow == "pure":
             require_in("strain", self.strain_end, RANGES["pure_strain"])
         super().__post_init__()
+
+    @property
+    def control(self) -> str:
+        """Controlled stress in the syntax of `fix overdamped/affine`."""
+        return (
+            ""
+            if self.hold_pressure is None
+            else f" stress yy {self.hold_pressure!r} tbox {self.t_box!r}"
+        )
+
+    def stresses(
+        self, found: Mapping[str, float], second: float, dimension: int
+    ) -> dict[str, float]:
+        """Return the normal pressure, where it is controlled."""
+        if self.hold_pressure is None:
+            return {}
+        away = second - found["normal_difference"]
+        return {"p_yy": found["pressure"] + away / dimension}
 
     def in_steps(self, rows: int) -> Shear:
         """Return the same with a time step equal to the interval of rows, or a divisor of it."""

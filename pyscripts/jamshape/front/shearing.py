@@ -51,6 +51,8 @@ def shear(
     gdot: float = 1e-4,
     strain: float = 5.0,
     flow: str = "simple",
+    pressure: float = 0.0,
+    t_box: float | None = None,
     seed: int | None = None,
     start: Held | None = None,
     sides: int = 2,
@@ -64,7 +66,7 @@ def shear(
     seconds: float | None = None,
     progress: bool = True,
 ) -> ShearFile:
-    """Shear particles at a constant rate and packing fraction, as in Marschall, Keta, Olsson & Teitel 2019.
+    """Shear particles at a constant rate and packing fraction, as in Marschall, Keta, Olsson & Teitel 2019, or pressure.
 
     Parameters
     ----------
@@ -82,6 +84,10 @@ def shear(
         Final strain, the rate times the time.
     flow : {"simple", "pure"}
         Simple or pure shear.
+    pressure : float, [energy / length^D]
+        Normal pressure p_yy to hold in simple shear, to which the height of the box yields; 0 holds the volume.
+    t_box : float, [time], optional
+        Time in which the height of the box relaxes, with a pressure; 0.01 / gdot by default, a strain of 0.01, but at least 1.
     seed : int, optional
         Random seed of the start; 1 by default.
     start : Packing or path, optional
@@ -132,12 +138,23 @@ def shear(
     >>> found.startup < 2 and 0 < found["mu"].value < 1
     True
     """
-    require_stated(gdot=gdot, strain=strain, rows=rows)
-    require_given(dt=dt, integration_tolerance=integration_tolerance, frames=frames)
+    require_stated(gdot=gdot, strain=strain, rows=rows, hold_pressure=pressure)
+    require_given(t_box=t_box, dt=dt, integration_tolerance=integration_tolerance, frames=frames)
     asked = Asked(n, phi, seed, dimension)
     of = Start.of(particles, asked, start, usual_phi=0.8, sides=sides, phi_name=_PHI_NAME)
     at = place(file, "shear.h5")
-    integrator = integrator or _usual(gdot, of.dimension, whole=dt is None and sides == 2)
+    whole = dt is None and sides == 2
+    if pressure:
+        held = {
+            "hold_pressure": pressure,
+            "t_box": max(1.0, 0.01 / gdot) if t_box is None else t_box,
+        }
+        integrator = integrator or ("rkc2" if whole else "heun")
+        _require_yielding(integrator, flow)
+    else:
+        require_no_effect("pressure", pressure, t_box=t_box)
+        held = {}
+        integrator = integrator or _usual(gdot, of.dimension, whole=whole)
     if integrator in METHODS:
         require_no_effect("integrator", integrator, dt=dt, frames=frames)
         longest = min(SlowShear.largest_strain, strain / rows)
@@ -150,6 +167,7 @@ def shear(
         settings = Shear(
             gdot=gdot, strain_end=strain, flow=flow, dt=min(0.05, 0.01 / gdot) if dt is None else dt,
             sides=sides, k_e=of.k_e, integrator=integrator, tolerance=integration_tolerance or _ERROR,
+            **held,
         )  # fmt: skip
         settings = _in_rows(settings, rows, dt=dt, integration_tolerance=integration_tolerance)
         sizes = Sizes(rows, _FRAMES if frames is None else frames)
@@ -413,6 +431,16 @@ def _usual(gdot: float, dimension: int, *, whole: bool) -> str:
     if not whole:
         return "heun"
     return "tr-bdf2" if gdot <= _SLOW[dimension] else "rkc2"
+
+
+def _require_yielding(integrator: str, flow: str) -> None:
+    """Refuse what does not go with a pressure."""
+    if integrator in METHODS:
+        said = "{integrator} holds the volume, expected rkc2, heun/adaptive or heun with a pressure"
+        raise ArgumentError(said, {"integrator": integrator})
+    if flow != "simple":
+        said = "{flow} shear drives the height of the box, expected simple shear with a pressure"
+        raise ArgumentError(said, {"flow": flow})
 
 
 def _require_cycle(amplitude: float, period: float, rows: int) -> None:

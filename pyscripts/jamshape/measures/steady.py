@@ -54,7 +54,7 @@ class SteadyState:
         Final strain.
     averages
         By name: ``pressure``, ``sigma``, ``mu``, ``shear_stress`` (-p_xy), ``normal_difference``
-        (p_xx - p_yy), ``z``, and for nonround particles ``S_2`` and ``rotation`` (-dtheta/dgamma); ``sigma``
+        (p_xx - p_yy), ``z``, at a held pressure ``p_yy``, ``phi`` and ``friction`` (-p_xy / p_yy), and for nonround particles ``S_2`` and ``rotation`` (-dtheta/dgamma); ``sigma``
         and ``S_2`` are those of the mean tensors, so that fluctuations of few particles do not bias them.
     director
         Angle of the mean nematic director from x, from -pi/2 to pi/2.
@@ -178,6 +178,8 @@ def _series_of(observables: Mapping[str, FloatArray], strain: FloatArray) -> dic
     for name in known.keys() - {"turned"}:
         known[name][0] = known[name][1]  # the start itself was not sheared
     found = {name: known[name] for name in ("pressure", "normal_difference", "z")}
+    if "p_yy" in known:  # a controlled one
+        found |= {name: known[name] for name in ("p_yy", "phi")}
     found |= {
         "shear_stress": -known["p_xy"],
         "S_2_x": known["S_2"] * np.cos(2 * known["director"]),
@@ -223,10 +225,17 @@ def _projected(part: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         found["S_2"] = _along_mean(part["S_2_x"], part["S_2_y"])
         found |= {"rotation": part["rotation"]} if "rotation" in part else {}
     if pressure.mean() > 0:
-        # The ratio of means has the error of the mean of sigma - mu p.
-        mu = sigma.mean() / pressure.mean()
-        found["mu"] = mu + (sigma - mu * pressure) / pressure.mean()
+        found["mu"] = _ratio(sigma, pressure)
+    if "p_yy" in part:
+        found |= {"p_yy": part["p_yy"], "phi": part["phi"]}
+        found["friction"] = _ratio(stress, part["p_yy"])
     return found
+
+
+def _ratio(of: FloatArray, over: FloatArray) -> FloatArray:
+    """(T,) values whose mean is the ratio m of the means, and has its error: that of the mean of `of` - m `over`."""
+    ratio = of.mean() / over.mean()
+    return np.asarray(ratio + (of - ratio * over) / over.mean())
 
 
 def _along_mean(x: FloatArray, y: FloatArray) -> FloatArray:

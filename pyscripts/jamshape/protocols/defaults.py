@@ -187,6 +187,7 @@ def recipe_for(
 
     Examples
     --------
+    >>> from jamshape.protocols.defaults import recipe_for
     >>> from jamshape.shapes.particles import Particles
     >>> recipe_for(Particles.of(alpha=4.0), protocol="marschall-2018").n
     1024
