@@ -182,7 +182,7 @@ def by_elimination(matrix: DynamicalMatrix, held: FloatArray, state: State) -> F
     pushed = C.T @ given.stretched + given.pushed
     right: LongArray = np.asarray(-(pushed - Z @ (Z.T @ pushed)), np.longdouble)
     x = eliminated(C.T @ C - S + Z @ Z.T, right)
-    rise = (np.asarray(given.stretched, np.longdouble) ** 2).sum(axis=0) + given.affine
+    rise = (np.asarray(given.stretched, np.longdouble) ** 2).sum(axis=0) + np.diag(given.affine)
     rise += (x * pushed).sum(axis=0)
     virial = (matrix.contacts["separation"] * matrix.contacts["force"]).sum(axis=0) / state.volume
     # A strain is not what the slope is taken by: exp(g/2) has a second derivative, 1/V another first one.

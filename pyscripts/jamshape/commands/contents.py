@@ -195,6 +195,8 @@ def _modes(table: ModeTable) -> dict[str, Any]:
     found |= _picked(known, ("shape", "phi", "u", *_MADE))
     found |= _picked(own, ("n", "n_modes", "z", "pressure", "method", "wall_seconds"))
     found |= {"modes": len(table["eigenvalues"]), "rattlers": own["n"] - own["n_backbone"]}
+    found |= _picked(own, ("bulk_modulus", "B_G_dc", "bordered_eigenvalue"))
+    found |= {"is_stable_to_shear": table.moduli.is_stable_to_shear}
     found |= {"error": own["residual"], "vectors": table.vectors.shape[1] > 0}
     return found | {"bands": {name: count_of(table, name) for name in TOLD}, "finished": True}
 

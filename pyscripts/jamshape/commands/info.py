@@ -49,6 +49,7 @@ _LINES = {
         "at pressure {hold_pressure:g}",
     ),
     "modes": ("{modes} of {n_modes}", "{bands_text}", "by the method {method!r}"),
+    "moduli": ("bulk {bulk_modulus:.6g}", "mean shear {B_G_dc:.6g}", "{stability_text}"),
     "holds": ("{frames} frames", "{rows} rows of error and time", "step {step}", "time {time:.6g}"),
     "error": ("{error_of} {error:.2g}",),
     "took": ("{wall_seconds:.3g} s",),
@@ -96,6 +97,10 @@ def lines_of(found: Mapping[str, Any]) -> Iterator[str]:
         counts = {name: count for name, count in found["bands"].items() if count is not None}
         told = ", ".join(f"{count} {name}" for name, count in counts.items())
         known["bands_text"] = told or "no bands"
+    if "is_stable_to_shear" in known:
+        known["stability_text"] = (
+            f"{'stable' if found['is_stable_to_shear'] else 'unstable'} to shear"
+        )
     for subject, parts in _LINES.items():
         said = [text for text in (_filled(part, known) for part in parts) if text]
         if said:

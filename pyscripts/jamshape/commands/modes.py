@@ -3,7 +3,7 @@
     jamshape modes PACKING.h5 --out modes.h5
 
 Eigenvalues of the dynamical matrix with signs and error bounds, bands and their counts, participation,
-kinds of motion and elastic moduli, to HDF5 (see jamshape.vibration.table). PACKING is any file with particles at rest: of
+kinds of motion, elastic moduli and stability to shear, to HDF5 (see jamshape.vibration.table). PACKING is any file with particles at rest: of
 `jamshape pack` or `jamshape minimise`, a LAMMPS dump or data file, GSD. Needs no LAMMPS, and
 cannot be put down on the way. The last line of standard output is one JSON object.
 """
@@ -30,8 +30,10 @@ from jamshape.shapes.command_line import add_meaning_options
 from jamshape.vibration.ensembles import TOLD
 from jamshape.vibration.statistics import Redundancy, redundancies
 from jamshape.vibration.table import BANDS, MODULI, ModeTable
+from jamshape.vibration.tensors import Modulus
 
 SHOWN = 12  # modes of the printed table
+STABLE = {True: "yes", False: "no", None: "undecided"}
 KINDS = ("rotation", "parallel", "perpendicular")
 
 
@@ -104,13 +106,23 @@ def show_moduli(table: ModeTable) -> None:
             f"a saddle, with {found.n_negative} negative eigenvalues: moduli hold as long as it stays"
         )
     for name in MODULI:
-        modulus = getattr(found, name)
-        defined = math.isfinite(modulus.relaxed)
-        bound = f" +- {modulus.bound:.2g}" if math.isfinite(modulus.bound) else ""
-        value = f"{modulus.relaxed:.8g}{bound}" if defined else "not defined"
-        why = f": {modulus.reason}" if modulus.reason else ""
-        print(f"{name.replace('_', ' ')} modulus {value}{why}")
+        print(f"{name.replace('_', ' ')} modulus {_text(getattr(found, name))}")
+    print(f"mean shear modulus {_text(found.B.G_dc)}")
+    for name, direction in (("G_min", "smallest"), ("G_max", "largest")):
+        print(f"{direction} shear modulus of all directions {_text(getattr(found.B, name))}")
     print(f"pressure {found.pressure:.8g}")
+    own = found.bordered
+    print(
+        f"stable to shear: {STABLE[found.is_stable_to_shear]}; smallest eigenvalue of the bordered Hessian"
+        f" {own.value:.6g} +- {own.bound:.2g}"
+    )
+
+
+def _text(modulus: Modulus) -> str:
+    """Write a modulus with its bound and reason."""
+    bound = f" +- {modulus.bound:.2g}" if math.isfinite(modulus.bound) else ""
+    value = f"{modulus.relaxed:.8g}{bound}" if math.isfinite(modulus.relaxed) else "not defined"
+    return f"{value}: {modulus.reason}" if modulus.reason else value
 
 
 def show_bands(table: ModeTable, bands: dict[str, Any]) -> None:
@@ -168,5 +180,6 @@ def main(options: Namespace) -> None:
         "at_minimum": not table.imbalance,
         "bands": bands,
         **table.attributes,
+        "is_stable_to_shear": table.moduli.is_stable_to_shear,
     }
     report(told | {"redundant": redundant})

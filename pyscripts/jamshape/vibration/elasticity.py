@@ -7,7 +7,7 @@ the forces through the prestress, twice the energy is to second order
     E(x) = |C x + s|^2 - x.S x + 2 x.f + (prestress term of the affine strain)
 
 for a motion x of the particles, and the modulus is the stationary value of E over the volume. The error
-of x enters it squared, over the eigenvalues.
+of x enters it squared, over the eigenvalues. All moduli are entries and sums of E as a bilinear form of strains.
 
 A floppy mode, with an eigenvalue below its bound, is left out if it does not couple to the
 strain. If one couples, E has no stationary value: the modulus is undefined. Modes along which the state has
@@ -21,13 +21,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jamshape.arrays import BoolArray, FloatArray, LongArray
+from jamshape.arrays import BoolArray, FloatArray, IntArray, LongArray
 from jamshape.landscape import Landscape, State
 from jamshape.vibration.extended import SparseRows
-from jamshape.vibration.hessian import LARGEST_RESIDUAL, DynamicalMatrix, Strains
-from jamshape.vibration.quotients import EPS, ROUNDINGS
+from jamshape.vibration.hessian import LARGEST_RESIDUAL, ROUNDINGS, DynamicalMatrix, Strains
+from jamshape.vibration.quotients import EPS
 from jamshape.vibration.sparse_modes import ShiftedInverse, softest
 from jamshape.vibration.spectrum import Spectrum, is_unsettled, nearer_minimum
+from jamshape.vibration.stability import BorderedMatrix, Eigenvalue, softest_of
+from jamshape.vibration.tensors import ElasticTensor, Modulus, pressure_terms, strains_of
 
 # Iterative refinements of a solution.
 _REFINEMENTS = 3
@@ -36,28 +38,12 @@ _REFINEMENTS = 3
 _SAFETY = 2.0
 
 
-class Modulus(NamedTuple):
-    """An elastic modulus with bounds of its error, [energy / length^D] each."""
-
-    relaxed: float
-    """The modulus, with forces balanced; NaN if undefined."""
-    affine: float
-    """The modulus if particles followed the strain."""
-    rounding: float
-    """Bound of the numerical error, for the state as it is."""
-    of_state: float
-    """Estimated bound of the change up to the minimum; inf if unknown."""
-    reason: str = ""
-    """One sentence on why the modulus is undefined, or its bound unknown."""
-
-    @property
-    def bound(self) -> float:
-        """Bound of the error; inf if unknown."""
-        return self.rounding + self.of_state
-
-
 class Moduli(NamedTuple):
-    """Elastic moduli of a packing, each the second derivative of the energy over the volume."""
+    """Elastic moduli of a packing, and its stability to shear.
+
+    The first three are second derivatives of the energy over the volume. `B` and `C` have all moduli; they differ from these, and
+    from each other, by terms of the pressure (see `jamshape.vibration.tensors`).
+    """
 
     bulk: Modulus
     """-V dp/dV."""
@@ -67,6 +53,12 @@ class Moduli(NamedTuple):
     """Modulus for gamma, with x moved by gamma y."""
     pressure: float
     """[energy / length^D], in the same state."""
+    B: ElasticTensor
+    """Change of the stress by strain: second derivatives of the enthalpy, with mean and extremal shear moduli."""
+    C: ElasticTensor
+    """Second derivatives of the energy by Green's strain."""
+    bordered: Eigenvalue
+    """Smallest eigenvalue of the bordered Hessian (`jamshape.vibration.stability`), [energy / length^2]."""
     n_floppy: int = 0
     """Number of floppy modes: eigenvalues below their bounds. They are left out of the moduli."""
     n_unsettled: int = 0
@@ -74,11 +66,23 @@ class Moduli(NamedTuple):
     n_negative: int = 0
     """Number of negative eigenvalues among known modes: at a saddle, moduli are not what shear measures."""
 
+    @property
+    def is_stable_to_shear(self) -> bool | None:
+        """Whether this is a minimum also in a box that can deform; None if the bounds leave it undecided.
+
+        True if the smallest eigenvalue of B is positive and that of the bordered Hessian not negative, False if one of them is
+        negative, each beyond its bound.
+        """
+        smallest = self.B.smallest
+        if self.bordered.sign < 0 or smallest.relaxed < -smallest.bound:
+            return False
+        return True if smallest.relaxed > smallest.bound else None
+
 
 def moduli(
     matrix: DynamicalMatrix, soft: Spectrum | None = None, at: tuple[Landscape, State] | None = None
 ) -> Moduli:
-    """Compute bulk and shear moduli with error bounds.
+    """Compute elastic moduli with error bounds.
 
     Parameters
     ----------
@@ -93,46 +97,109 @@ def moduli(
     -------
     Moduli
     """
-    response = Response.of(matrix, _strains(matrix), softest(matrix, soft))
-    here = _Combined.of(matrix, response.here.value)
-    affine = _Combined.of(matrix, _point(matrix, response.strains, 0 * response.motion).value)
-    rounding = response.rounding() / matrix.volume * here.scale + here.rounding
-    drift, of_state, unknown = None, np.full(3, np.inf), ""
+    D = matrix.coordinates.dimension
+    response, table = Response.of(matrix, _strains(D), softest(matrix, soft)), _Table.of(D)
+    here = table.values(matrix, response.here.value)
+    affine = table.values(matrix, _point(matrix, response.strains, 0 * response.motion).value)
+    rounding = table.bounds(matrix, response.rounding())
+    drift, of_state, unknown = None, np.full(len(here), np.inf), ""
     if at is not None:
         near = nearer_minimum(*at, matrix, response.solved(-matrix.gradient))
         unknown = _changed(matrix, near.matrix)
     if at is not None and not unknown:
         there = _point(near.matrix, response.strains, response.motion)
-        change = np.abs(_Combined.of(near.matrix, there.value).value - here.value) / near.part
+        change = np.abs(table.values(near.matrix, there.value) - here) / near.part
         drift = (there.left - response.here.left).astype(np.float64) / near.part
-        further = response.squared(response.along(drift)) / matrix.volume * here.scale
+        further = table.picked(response.squared(response.along(drift))) / matrix.volume
         of_state = _SAFETY * (change + further)
-    verdicts, value = response.verdicts(drift), here.value
-    bulk, pure_shear, simple_shear = (
-        Modulus(
-            relaxed=float(value[k]) if verdicts[k].is_defined else np.nan,
-            affine=float(affine.value[k]),
-            rounding=float(rounding[k]),
-            of_state=np.inf if verdicts[k].reason else float(of_state[k]),
-            reason=verdicts[k].reason or unknown,
+    verdicts = response.verdicts(drift)
+    here[~table.both([one.is_defined for one in verdicts])] = np.nan
+    of_state[~table.both([not one.reason for one in verdicts])] = np.inf
+    columns = np.stack([here, affine, rounding, of_state])
+    reasons = tuple(one.reason or unknown for one in verdicts)
+    known, pressure = response.soft, float(np.trace(matrix.pressure_tensor)) / D
+    bulk, pure_shear, simple_shear = (table.modulus(k, columns, reasons) for k in range(3))
+    return Moduli(
+        bulk,
+        pure_shear,
+        simple_shear,
+        pressure,
+        *table.tensors(columns, reasons),
+        _bordered(matrix),
+        n_floppy=int(known.is_floppy.sum()),
+        n_unsettled=int((response.is_unsettled & ~known.is_floppy).sum()),
+        n_negative=int((known.sign[known.is_firm] < 0).sum()),
+    )
+
+
+def _bordered(matrix: DynamicalMatrix) -> Eigenvalue:
+    """Find the smallest eigenvalue of the bordered Hessian; NaN in a state that is not at a minimum."""
+    if matrix.residual.largest > LARGEST_RESIDUAL:
+        return Eigenvalue(np.nan, np.inf)
+    return softest_of(BorderedMatrix.of(matrix)).eigenvalue
+
+
+def _strains(D: int) -> FloatArray:
+    """(d + 2, D, D) strains: those of the components of a tensor, dilation and pure shear."""
+    pure_shear = np.zeros((D, D))
+    pure_shear[0, 0], pure_shear[1, 1] = 0.5, -0.5
+    return np.concatenate([strains_of(D), [np.eye(D), pure_shear]])
+
+
+class _Table(NamedTuple):
+    """Linear combinations of E over the volume and of the pressure: bulk, pure and simple shear, B and C; q in all."""
+
+    strains: IntArray
+    """(2, q) rows of `_strains`."""
+    scale: FloatArray
+    """(q,)"""
+    weights: FloatArray
+    """(q, D, D) of the pressure tensor."""
+
+    @classmethod
+    def of(cls, D: int) -> _Table:
+        """List them."""
+        d, terms = len(strains_of(D)), pressure_terms(D)
+        own = np.array([d, d + 1, d - 1])
+        entries = np.indices((d, d)).reshape(2, -1)
+        weights = np.zeros((3, D, D))
+        weights[0], weights[1, [0, 1], [0, 1]] = (D - 1) / D**2 * np.eye(D), -0.25
+        return cls(
+            strains=np.hstack([[own, own], entries, entries]),
+            scale=np.concatenate([[1 / D**2], np.ones(2 + 2 * d * d)]),
+            weights=np.concatenate([weights, *(w.reshape(-1, D, D) for w in terms)]),
         )
-        for k in range(3)
-    )
-    known = response.soft
-    n_floppy, n_unsettled = (
-        int(part.sum()) for part in (known.is_floppy, response.is_unsettled & ~known.is_floppy)
-    )
-    n_negative = int((known.sign[known.is_firm] < 0).sum())
-    return Moduli(bulk, pure_shear, simple_shear, here.pressure, n_floppy, n_unsettled, n_negative)
 
+    def picked(self, second: LongArray | FloatArray) -> FloatArray:
+        """(q,) entries of a (k, k) matrix over the strains."""
+        return np.asarray(second[tuple(self.strains)] * self.scale, np.float64)
 
-def _strains(matrix: DynamicalMatrix) -> FloatArray:
-    """(3, D, D) strains of `Moduli`: dilation, pure shear and simple shear."""
-    D = matrix.coordinates.dimension
-    strains = np.zeros((3, D, D))
-    strains[0] = np.eye(D)
-    strains[1, 0, 0], strains[1, 1, 1], strains[2, 0, 1] = 0.5, -0.5, 1.0
-    return strains
+    def values(self, matrix: DynamicalMatrix, second: LongArray) -> FloatArray:
+        """(q,) values."""
+        pressures = np.einsum("qab,ab->q", self.weights, matrix.pressure_tensor)
+        return np.asarray(self.picked(second) / matrix.volume + pressures)
+
+    def bounds(self, matrix: DynamicalMatrix, second: FloatArray) -> FloatArray:
+        """(q,) bounds of their errors by rounding, from those of E."""
+        pressures = np.einsum("qab,ab->q", np.abs(self.weights), matrix.pressure_rounding)
+        return np.asarray(self.picked(second) / matrix.volume + pressures)
+
+    def both(self, holds: list[bool]) -> BoolArray:
+        """(q,) whether something holds of both strains."""
+        return np.asarray(np.all(np.asarray(holds)[self.strains], axis=0))
+
+    def modulus(self, k: int, columns: FloatArray, reasons: tuple[str, ...]) -> Modulus:
+        """Entry k of (4, q) numbers of a `Modulus`."""
+        relaxed, affine, rounding, of_state = columns[:, k].tolist()
+        return Modulus(relaxed, affine, rounding, of_state, reasons[self.strains[0, k]])
+
+    def tensors(
+        self, columns: FloatArray, reasons: tuple[str, ...]
+    ) -> tuple[ElasticTensor, ElasticTensor]:
+        """B and C."""
+        d = len(reasons) - 2
+        B, C = columns[:, 3:].reshape(4, 2, d, d).swapaxes(0, 1)
+        return ElasticTensor.of(B, reasons[:d]), ElasticTensor.of(C, reasons[:d])
 
 
 def _changed(matrix: DynamicalMatrix, nearer: DynamicalMatrix) -> str:
@@ -146,33 +213,11 @@ def _changed(matrix: DynamicalMatrix, nearer: DynamicalMatrix) -> str:
     )
 
 
-class _Combined(NamedTuple):
-    """Moduli as sums of energy second derivatives over the volume and of the pressure; (3,) each."""
-
-    value: FloatArray
-    scale: FloatArray
-    rounding: FloatArray
-    pressure: float
-
-    @classmethod
-    def of(cls, matrix: DynamicalMatrix, second: LongArray) -> _Combined:
-        D, V = matrix.coordinates.dimension, matrix.volume
-        separation, force = matrix.contacts["separation"], matrix.contacts["force"]
-        virial = (separation * force).sum(axis=0) / V
-        lost = ROUNDINGS * EPS + matrix.overlap_rounding
-        sizes = (np.abs(separation * force) * lost[:, None]).sum(axis=0) / V
-        weights = np.zeros((3, D))
-        weights[0], weights[1, :2] = (D - 1) / D**2, -0.25
-        scale = np.array([1 / D**2, 1.0, 1.0])
-        value = np.asarray(second, np.float64) / V * scale + weights @ virial
-        return cls(value, scale, np.abs(weights) @ sizes, float(virial.sum()) / D)
-
-
 class _Point(NamedTuple):
-    """E(x) of k strains at some motions."""
+    """E of k strains at some motions, as a bilinear form."""
 
     value: LongArray
-    """(k,) E."""
+    """(k, k) E."""
     left: LongArray
     """(n, k) half the slope of E."""
     stretched: LongArray
@@ -247,24 +292,23 @@ class Response:
         return np.asarray(np.abs(np.vstack([parts, np.linalg.norm(beside, axis=0)])))
 
     def squared(self, along: FloatArray) -> FloatArray:
-        """(k,) bound of the change of E by such a remaining slope."""
+        """(k, k) bound of the change of E by such a remaining slope."""
         values, bound = (np.abs(self.soft.eigenvalues[self._is_in]), self.soft.bound[self._is_in])
         # All unknown modes are stiffer than the known ones; a whole spectrum has no unknown modes.
         beside = 0.5 * values.max(initial=0.0) if values.size else np.inf
         stiffness = np.append(values - bound, beside)
-        return np.asarray((along**2 / stiffness[:, None]).sum(axis=0))
+        return np.asarray(along.T @ (along / stiffness[:, None]))
 
     def rounding(self) -> FloatArray:
-        """(k,) bound of the error of E by rounding of C, S, s and f, and of the motion."""
+        """(k, k) bound of the error of E by rounding of C, S, s and f, and of the motion."""
         x, y = np.abs(self.motion), np.abs(self.here.stretched).astype(np.float64)
         by_C, by_S = self._changes()
-        first = 2 * (y * by_C).sum(axis=0) + (x * by_S).sum(axis=0)
-        first += 2 * (x * self.errors.pushed).sum(axis=0) + self.errors.affine
+        first = 2 * y.T @ by_C + x.T @ by_S + 2 * x.T @ self.errors.pushed + self.errors.affine
         left = self.here.left.astype(np.float64)
         along = self.along(left)
         along[:-1] += np.abs(self.soft.vectors[:, self._is_in]).T @ self._left_error()
         along[-1] += np.linalg.norm(self._left_error(), axis=0)
-        return np.asarray(first + (by_C**2).sum(axis=0) + self.squared(along))
+        return np.asarray(0.5 * (first + first.T) + by_C.T @ by_C + self.squared(along))
 
     def verdicts(self, drift: FloatArray | None) -> list[_Verdict]:
         """Decide for each strain whether the modulus is defined, or why not."""
@@ -340,10 +384,10 @@ def _point(matrix: DynamicalMatrix, strains: FloatArray, x: FloatArray) -> _Poin
     given, long = matrix.strained(strains), np.asarray(x, np.longdouble)
     stretched = SparseRows(matrix.compatibility) @ long + given.stretched
     pushed = SparseRows(matrix.prestress) @ long
-    value = (stretched**2).sum(axis=0) - (long * pushed).sum(axis=0)
-    value += 2 * (long * given.pushed).sum(axis=0) + given.affine
+    value = stretched.T @ stretched - long.T @ pushed + given.affine
+    value += long.T @ given.pushed + given.pushed.T @ long
     left = SparseRows(matrix.compatibility.T) @ stretched - pushed + given.pushed
-    return _Point(value, np.asarray(left, np.longdouble), stretched)
+    return _Point(0.5 * (value + value.T), np.asarray(left, np.longdouble), stretched)
 
 
 def _errors_of(matrix: DynamicalMatrix, strains: FloatArray) -> Strains:

@@ -24,6 +24,9 @@ from jamshape.minima import Residual, residual_of
 from jamshape.records import Record
 from jamshape.vibration.extended import EPS
 
+ROUNDINGS = 4.0
+"""Error of entries of C and S, and of pressures, in roundings, at most: of their factors, and of sums."""
+
 # Bound of the error of lengths in roundings of long doubles: sums of squares, roots, and positions of feet.
 _ROUNDINGS = 4.0
 
@@ -119,7 +122,7 @@ class Strains(NamedTuple):
     pushed: FloatArray
     """(n, k) change of the forces by the prestress alone: -S between strain and coordinates."""
     affine: LongArray
-    """(k,) second derivative of the energy by the prestress alone, in long double."""
+    """(k, k) second derivatives of the energy by the prestress alone, in long double."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,8 +239,24 @@ class DynamicalMatrix(Record):
         bent = np.einsum("cva,cka->ckv", self.curvature[:, :, :D], moved)
         scatter = _Scatter(self.contacts["particles"], self.coordinates)
         pushed = np.column_stack([scatter.vector(bent[:, k]) for k in range(len(strains))])
-        affine = (bent[:, :, :D] * moved).sum(axis=(0, 2), dtype=np.longdouble)
+        affine = np.einsum("cka,cla->kl", bent[:, :, :D], moved, dtype=np.longdouble)
         return Strains(stretched, pushed, affine)
+
+    @property
+    def pressure_tensor(self) -> FloatArray:
+        """(D, D) pressure tensor of these contacts, symmetric."""
+        return self._virial(self.contacts["separation"], self.contacts["force"])
+
+    @property
+    def pressure_rounding(self) -> FloatArray:
+        """(D, D) bound of its error by rounding."""
+        separation, force = (np.abs(self.contacts[name]) for name in ("separation", "force"))
+        lost = ROUNDINGS * np.finfo(np.float64).eps + self.overlap_rounding
+        return self._virial(separation, force * lost[:, None])
+
+    def _virial(self, separation: FloatArray, force: FloatArray) -> FloatArray:
+        virial = np.einsum("ca,cb->ab", separation, force) / self.volume
+        return np.asarray(0.5 * (virial + virial.T))
 
     def strained_sizes(self, strains: FloatArray) -> tuple[Strains, Strains]:
         """Sum the magnitudes of the summands in `strained`, and bound the effect of rounding of overlaps."""
@@ -250,7 +269,7 @@ class DynamicalMatrix(Record):
         def added(curvature: FloatArray, stretched: FloatArray) -> Strains:
             bent = np.einsum("cva,cka->ckv", np.abs(curvature[:, :, :D]), moved)
             pushed = [scatter.vector_sizes(bent[:, k]) for k in range(len(strains))]
-            affine = np.einsum("cka,cka->k", bent[:, :, :D], moved)
+            affine = np.einsum("cka,cla->kl", bent[:, :, :D], moved)
             return Strains(stretched, np.column_stack(pushed), affine)
 
         lost = self.overlap_rounding[:, None, None] * self.curvature

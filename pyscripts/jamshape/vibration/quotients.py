@@ -11,12 +11,9 @@ from scipy.sparse.csgraph import connected_components
 from jamshape.arrays import FloatArray, LongArray
 from jamshape.vibration.extended import EPS as LONG_EPS
 from jamshape.vibration.extended import SparseRows
-from jamshape.vibration.hessian import DynamicalMatrix
+from jamshape.vibration.hessian import ROUNDINGS, DynamicalMatrix
 
 EPS = float(np.finfo(np.float64).eps)
-
-# Error of the entries of C and S in roundings, at most: of their factors, and of sums.
-ROUNDINGS = 4.0
 
 # Columns multiplied in long double at once, to bound memory.
 _COLUMNS = 256

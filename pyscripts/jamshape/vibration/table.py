@@ -6,14 +6,15 @@
     vectors (n, k) if requested
     /coordinates    particle, kind (n,), direction (n, D + T): see `jamshape.vibration.hessian.Coordinates`
     /singular_values
-    /parameters     +every scalar result, and attributes of the packing and the method: for each modulus
-    its value (NaN if undefined), _affine, _rounding, _of_state and, if needed, _reason
+    /parameters     +every scalar result, and attributes of the packing and the method: for each modulus, and for the
+    tensors B and C (see `jamshape.vibration.tensors`) as matrices, its value (NaN if undefined), _bound, _affine, _rounding,
+    _of_state and, if needed, _reason; bordered_eigenvalue, _bound; is_stable_to_shear, if decided
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,10 +28,12 @@ from jamshape.files.hdf5 import FileFormatError
 from jamshape.files.layout import version
 from jamshape.files.vocabulary import FORMAT_VERSION, require_format
 from jamshape.landscape import Landscape, State
-from jamshape.vibration.elasticity import Moduli, Modulus, moduli
+from jamshape.vibration.elasticity import Moduli, moduli
 from jamshape.vibration.hessian import LARGEST_RESIDUAL, Coordinates, DynamicalMatrix
 from jamshape.vibration.spectrum import Spectrum, state_error
+from jamshape.vibration.stability import Eigenvalue
 from jamshape.vibration.statistics import bands, components, count, participation, why_no_bands
+from jamshape.vibration.tensors import COMPONENTS, ElasticTensor, Modulus
 
 if TYPE_CHECKING:
     import h5py
@@ -39,8 +42,14 @@ BANDS = {-1: "translation", 0: "low", 1: "middle", 2: "high", 3: "none"}
 _TRANSLATION, _HIGH, _NONE = -1, 2, 3
 
 MODULI = ("bulk", "pure_shear", "simple_shear")
+TENSORS = ("B", "C")
+AVERAGES = ("G_dc", "G_ac", "G_min", "G_max", "smallest")
+"""Moduli of B that are stored beside it."""
+
 COUNTS = ("n_floppy_left_out", "n_unsettled_left_out", "n_negative_modes")
 """Attributes with the counts of `Moduli`."""
+
+_BORDERED = ("eigenvalue", "eigenvalue_bound")
 
 PARTS = ("affine", "rounding", "of_state")
 """Ends of the names of attributes with parts of a `Modulus`."""
@@ -145,8 +154,11 @@ class ModeTable:
         """Elastic moduli."""
         a = self.attributes
         bulk, pure_shear, simple_shear = (_stored_modulus(a, f"{name}_modulus") for name in MODULI)
+        D = self.coordinates.dimension
+        B, C = (_stored_tensor(a, name, D) for name in TENSORS)
+        bordered = Eigenvalue(*(float(a.get(f"bordered_{name}", np.nan)) for name in _BORDERED))
         counts = (int(a[name]) for name in COUNTS)
-        return Moduli(bulk, pure_shear, simple_shear, a["pressure"], *counts)
+        return Moduli(bulk, pure_shear, simple_shear, a["pressure"], B, C, bordered, *counts)
 
 
 def tabulate(
@@ -214,9 +226,11 @@ def _moduli(matrix: DynamicalMatrix, found: Spectrum, at: tuple[Landscape, State
         return elastic
     why = f"the bound is unknown, as {matrix.n_left_out} contacts were left out"
     given = {name: getattr(elastic, name) for name in MODULI}
-    return elastic._replace(
-        **{name: m._replace(reason=m.reason or why) for name, m in given.items()}
-    )
+    known: dict[str, Any] = {name: m._replace(reason=m.reason or why) for name, m in given.items()}
+    for name in TENSORS:
+        tensor: ElasticTensor = getattr(elastic, name)
+        known[name] = replace(tensor, reasons=tuple(one or why for one in tensor.reasons))
+    return elastic._replace(**known)
 
 
 def _to_store(elastic: Moduli) -> dict[str, Any]:
@@ -226,11 +240,39 @@ def _to_store(elastic: Moduli) -> dict[str, Any]:
     found |= dict(zip(COUNTS, counts, strict=True))
     for name in MODULI:
         modulus: Modulus = getattr(elastic, name)
-        key = f"{name}_modulus"
-        found |= {key: modulus.relaxed, f"{key}_bound": modulus.bound}
-        found |= {f"{key}_{part}": getattr(modulus, part) for part in PARTS}
-        found |= {f"{key}_reason": modulus.reason} if modulus.reason else {}
-    return found
+        found |= _parts(f"{name}_modulus", modulus)
+        found |= {f"{name}_modulus_reason": modulus.reason} if modulus.reason else {}
+    for name in TENSORS:
+        tensor: ElasticTensor = getattr(elastic, name)
+        why = zip(tensor.components, tensor.reasons, strict=True)
+        found |= _parts(name, tensor)
+        found |= {f"{name}_{component}_reason": reason for component, reason in why if reason}
+    for name in AVERAGES:
+        average: Modulus = getattr(elastic.B, name)
+        found |= {f"B_{name}": average.relaxed, f"B_{name}_bound": average.bound}
+    found |= {f"bordered_{k}": v for k, v in zip(_BORDERED, elastic.bordered, strict=True)}
+    stable = elastic.is_stable_to_shear
+    return found if stable is None else found | {"is_stable_to_shear": stable}
+
+
+def _parts(key: str, modulus: Modulus | ElasticTensor) -> dict[str, Any]:
+    """List value, bound and the parts of a modulus or tensor."""
+    found = {key: modulus.relaxed, f"{key}_bound": modulus.bound}
+    return found | {f"{key}_{part}": getattr(modulus, part) for part in PARTS}
+
+
+def _stored_tensor(attributes: Mapping[str, Any], name: str, dimension: int) -> ElasticTensor:
+    """Read a tensor; without any, as in files of earlier versions, it is undefined."""
+    components = COMPONENTS[dimension]
+    d = len(components)
+    if name not in attributes:
+        why = "the file has no elastic tensors; compute its modes again"
+        nothing, unknown = np.full((d, d), np.nan), np.full((d, d), np.inf)
+        return ElasticTensor.of((nothing, nothing, unknown, unknown), (why,) * d)
+    keys = (name, *(f"{name}_{part}" for part in PARTS))
+    arrays = [np.asarray(attributes[key], np.float64) for key in keys]
+    reasons = tuple(str(attributes.get(f"{name}_{one}_reason", "")) for one in components)
+    return ElasticTensor.of(arrays, reasons)
 
 
 def _stored_modulus(attributes: Mapping[str, Any], key: str) -> Modulus:

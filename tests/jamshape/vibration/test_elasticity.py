@@ -108,7 +108,7 @@ def strains_of(matrix):
     """Simple shear: change of the forces at fixed positions, and the energy's second derivative."""
     given = matrix.strained(np.array([[[0.0, 1.0], [0.0, 0.0]]]))
     pushed = matrix.compatibility.T @ given.stretched[:, 0] + given.pushed[:, 0]
-    return pushed, float((given.stretched**2).sum() + given.affine[0])
+    return pushed, float((given.stretched**2).sum() + given.affine[0, 0])
 
 
 def test_floppy_modes_are_left_out():
@@ -166,7 +166,7 @@ def test_rounding_is_bounded(name):
         push = C.T * s + f
         beside = C.T * C - S + Z * Z.T  # which does not move what is held
         x = mpmath.lu_solve(beside, -push + Z * (Z.T * push))
-        exact = (s.T * s)[0] + mpmath.mpf(float(given.affine[0])) + (x.T * push)[0]
+        exact = (s.T * s)[0] + mpmath.mpf(float(given.affine[0, 0])) + (x.T * push)[0]
         error = float(abs(exact / mpmath.mpf(matrix.volume) - found.simple_shear.relaxed))
     assert error <= found.simple_shear.rounding + 1e-16 * abs(found.simple_shear.relaxed)
 

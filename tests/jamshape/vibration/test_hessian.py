@@ -136,7 +136,7 @@ def test_strains_are_second_derivatives():
     by_strain = (gradient_and_slope(strained(H)) - gradient_and_slope(strained(-H))) / (2 * H)
     coupling = matrix.compatibility.T @ found.stretched[:, 0] + found.pushed[:, 0]
     assert_close(coupling, by_strain[:-1], 1e-7)
-    second = (found.stretched[:, 0] ** 2).sum() + found.affine[0]
+    second = (found.stretched[:, 0] ** 2).sum() + found.affine[0, 0]
     assert second == pytest.approx(by_strain[-1], rel=1e-7)
 
 
