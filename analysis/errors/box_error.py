@@ -163,7 +163,11 @@ def main(options: Namespace) -> None:
     save_figure(figure_from(curves, options.n), options.out)
     print(table_of(curves))
     store(options.out.with_suffix(".json"), json.dumps(plain(curves), indent=1).encode())
-    report({"out": options.out, "curves": curves})
+    named = [
+        {"name": f"p = {of.pressure:g}, {of.shape}", "seconds": of.seconds, "error": of.stress}
+        for of in curves
+    ]
+    report({"out": options.out, "n": options.n, "curves": named})
 
 
 if __name__ == "__main__":

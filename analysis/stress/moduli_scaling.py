@@ -4,8 +4,8 @@
 
 Each packing is made at the lowest pressure, in a box that changes its volume only, and compressed to one pressure after the
 other, as by Zhang, VanderWerf, Li, Zhang, Shattuck & O'Hern, Phys. Rev. E 104, 014901 (2021). G is the change of the shear stress
-under simple shear at a fixed volume, averaged over all packings, also those of negative G. The fit gives weights by the standard errors;
-the errors of beta and G_0 are those of the bootstrap over packings. Finished packings are kept in --runs: a command that is stopped and
+under simple shear at a fixed volume. Averages are over all packings, over those of positive G only, and over all packings and all directions of
+shear. Fits are weighted by the standard errors; the errors of beta and G_0 are those of the bootstrap over packings. Finished packings are kept in --runs: a command that is stopped and
 repeated goes on. The last line of standard output is one JSON object.
 """
 
@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from jamshape.arrays import FloatArray, IntArray
+from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, plain, report, run
 from jamshape.drawing.saving import save_figure
 from jamshape.files.disk import store
@@ -36,15 +36,16 @@ from common.stressed import (
     pressures_of,
     table_of,
 )
-from common.styles import color, marked
+from common.styles import marked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _BETAS = np.linspace(0.1, 2.0, 381)
-PUBLISHED = {0.0: "0.5", 1.0: "0.8 to 0.9"}
-"""Exponents of the paper, by alpha."""
+AVERAGES = ("all", "positive", "directions")
+"""G of all packings, of those of positive G, and of all packings over all directions of shear."""
+DRAWN = AVERAGES[:2]
 
 
 class Fit(NamedTuple):
@@ -68,98 +69,115 @@ def fitted(p: FloatArray, G: FloatArray, error: FloatArray) -> Fit:
     return best
 
 
+class Average(NamedTuple):
+    """Average over packings with its fit."""
+
+    G: FloatArray
+    """(k,) by pressure."""
+    error: FloatArray
+    """(k,)"""
+    fit: Fit
+    errors: Fit
+    """Standard deviations over the bootstrap."""
+
+
 class Scaling(NamedTuple):
-    """Averages of a system with their fit."""
+    """Averages of a system."""
 
     alpha: float
     n: int
     samples: int
     p: FloatArray
-    G: FloatArray
-    error: FloatArray
+    averages: dict[str, Average]
+    """By `AVERAGES`."""
     positive: FloatArray
-    """Averages over packings of positive G."""
-    share: FloatArray
-    """Of these."""
+    """(k,) share of packings of positive G."""
     undefined: FloatArray
-    """Share of packings without a modulus: forces do not balance, or a floppy mode couples."""
-    fit: Fit
-    errors: Fit
-    """Standard deviations over the bootstrap."""
+    """(k,) share of packings without a modulus: forces do not balance, or a floppy mode couples."""
     last: float
     """Highest pressure of the fit."""
+
+
+def columns_of(table: Table) -> dict[str, FloatArray]:
+    """List (m, k) moduli to average, as in `AVERAGES`."""
+    G = table.column("G")
+    return dict(zip(AVERAGES, (G, np.where(G > 0, G, np.nan), table.column("G_dc")), strict=True))
 
 
 def scaling_of(alpha: float, n: int, table: Table, last: float) -> Scaling:
     """Average and fit."""
     G, p = table.column("G"), table.pressures
+    averages = {name: average_of(p, of, last) for name, of in columns_of(table).items()}
+    positive = (G > 0).sum(axis=0) / np.isfinite(G).sum(axis=0)
+    undefined = np.isnan(G).mean(axis=0)
+    return Scaling(alpha, n, len(G), p, averages, positive, undefined, last)
+
+
+def average_of(p: FloatArray, G: FloatArray, last: float) -> Average:
+    """Average (m, k) moduli and fit, up to a pressure; a fifth of the draws is fitted."""
     mean, error = mean_and_error(G)
     of = p <= last * (1 + 1e-9)
-    fit = fitted(p[of], mean[of], error[of])
-    drawn = np.array(
-        [fitted(p[of], np.nanmean(G[k][:, of], axis=0), error[of]) for k in _few(len(G))]
-    )
-    return Scaling(
-        alpha, n, len(G), p, mean, error, mean_and_error(np.where(G > 0, G, np.nan))[0],
-        (G > 0).sum(axis=0) / np.isfinite(G).sum(axis=0), np.isnan(G).mean(axis=0),
-        fit, Fit(*drawn.std(axis=0)), last,
-    )  # fmt: skip
-
-
-def _few(n: int) -> list[IntArray]:
-    """Take a fifth of the draws, as each is fitted."""
-    return list(draws(n))[::5]
+    drawn = [
+        fitted(p[of], np.nanmean(G[k][:, of], axis=0), error[of]) for k in list(draws(len(G)))[::5]
+    ]
+    return Average(mean, error, fitted(p[of], mean[of], error[of]), Fit(*np.std(drawn, axis=0)))
 
 
 def figure_from(found: list[Scaling]) -> Figure:
     """Draw G on the left and G - G_0 on the right."""
-    figure = figure_of(9.5, 4.3, dpi=160)
+    figure = figure_of(9.5, 4.6, dpi=160)
     left, right = figure.subplots(1, 2)
     for k, of in enumerate(found):
-        label = rf"$\alpha={of.alpha:g}$, {of.samples} packings"
-        left.errorbar(of.p, of.G, of.error, **marked(k), label=label)
-        left.plot(of.p, of.positive, ":", lw=1, color=color(k), label="the same, of $G>0$ only")
-        _draw_power(right, of, k)
-    left.set(xscale="log", yscale="log", ylabel=r"shear modulus $\langle G\rangle$  $[k_e/R^2]$")
-    right.set(xscale="log", yscale="log", ylabel=r"$\langle G\rangle-G_0$  $[k_e/R^2]$")
+        for j, name in enumerate(DRAWN):
+            style = marked(k + j * len(found))
+            label = rf"$\alpha={of.alpha:g}$, {of.samples} packings" + ", of $G>0$" * (
+                name != "all"
+            )
+            average = of.averages[name]
+            left.errorbar(of.p, average.G, average.error, **style, label=label)
+            _draw_power(right, of, name, style)
+    left.set(ylabel=r"shear modulus $\langle G\rangle$  $[k_e/R^2]$")
+    right.set(ylabel=r"$\langle G\rangle-G_0$  $[k_e/R^2]$")
     for axes in (left, right):
-        axes.set_xlabel(r"pressure $p$  $[k_e/R^2]$")
+        axes.set(xscale="log", yscale="log", xlabel=r"pressure $p$  $[k_e/R^2]$")
         axes.legend(fontsize=7)
-    first = found[0]
     names = ", ".join(f"{of.alpha:g}" for of in found)
     figure.suptitle(
-        rf"spherocylinders in 2D, $\alpha={names}$, $N={first.n}$, size ratio 1.4, compressed to $p$ in square boxes"
-        "\nbars: standard errors over packings, by the bootstrap; lines on the right: fits",
+        rf"spherocylinders in 2D, $\alpha={names}$, $N={found[0].n}$, size ratio 1.4, compressed to $p$ in square boxes"
+        "\nbars: standard errors over packings, by the bootstrap; lines: fits of $G_0+cp^\\beta$",
         fontsize=9,
     )
     return figure
 
 
-def _draw_power(axes: Axes, of: Scaling, k: int) -> None:
-    fit, error = of.fit, of.errors
-    above = of.G - fit.G_0
-    own = above > 2 * of.error
-    axes.errorbar(of.p[own], above[own], of.error[own], **marked(k))
+def _draw_power(axes: Axes, of: Scaling, name: str, style: dict[str, Any]) -> None:
+    average = of.averages[name]
+    fit, above = average.fit, average.G - average.fit.G_0
+    own = above > average.error
+    axes.errorbar(of.p[own], above[own], average.error[own], **style)
     p = of.p[of.p <= of.last * (1 + 1e-9)]
-    label = rf"$\alpha={of.alpha:g}$: $\beta={fit.beta:.2f}\pm{error.beta:.2f}$"
-    if of.alpha in PUBLISHED:
-        label += f" (published {PUBLISHED[of.alpha]})"
-    axes.plot(p, fit.c * p**fit.beta, "-", lw=0.9, color=color(k), label=label)
-
-
-def rows_of(of: Scaling) -> list[dict[str, Any]]:
-    """Rows of the table."""
-    names = ("p", "G", "error", "positive", "share", "undefined")
-    keys = ("pressure", "G", "G_error", "G_of_positive", "share_positive", "share_undefined")
-    columns = [getattr(of, name) for name in names]
-    return [dict(zip(keys, row, strict=True)) for row in zip(*columns, strict=True)]
+    label = rf"$\alpha={of.alpha:g}$" + ", $G>0$" * (name != "all")
+    label += rf": $\beta={fit.beta:.2f}\pm{average.errors.beta:.2f}$"
+    axes.plot(p, fit.c * p**fit.beta, "-", lw=0.9, color=style["color"], label=label)
 
 
 def summary(of: Scaling) -> dict[str, Any]:
     """Describe a system in JSON."""
-    numbers = {"G_0": of.fit.G_0, "G_0_error": of.errors.G_0, "c": of.fit.c, "beta": of.fit.beta}
-    numbers |= {"beta_error": of.errors.beta, "chi2": of.fit.chi2, "fitted_to": of.last}
-    return {"alpha": of.alpha, "n": of.n, "samples": of.samples, **numbers, "points": rows_of(of)}
+    fits = {
+        name: {
+            "G_0": one.fit.G_0, "G_0_error": one.errors.G_0, "c": one.fit.c,
+            "beta": one.fit.beta, "beta_error": one.errors.beta, "chi2": one.fit.chi2,
+        }
+        for name, one in of.averages.items()
+    }  # fmt: skip
+    points = [
+        {"pressure": p, "share_positive": of.positive[k], "share_undefined": of.undefined[k]}
+        | {f"G_{name}": one.G[k] for name, one in of.averages.items()}
+        | {f"G_{name}_error": one.error[k] for name, one in of.averages.items()}
+        for k, p in enumerate(of.p)
+    ]
+    told = {"alpha": of.alpha, "n": of.n, "samples": of.samples, "fitted_to": of.last}
+    return {**told, "fits": fits, "points": points}
 
 
 def parser() -> ArgumentParser:
