@@ -75,7 +75,10 @@ def test_user_errors_are_one_sentence(problem, tmp_path):
     assert "No such file" in problem(SCRIPT, path, "--out", tmp_path / "none" / "out.png")
     assert "not supported" in problem(SCRIPT, path, "--out", tmp_path / "out.nonsense")
     said = problem(SCRIPT, path, "--color", "C4", "--out", out)
-    assert "particles are in 2D and coloured by C4 (cubatic), expected S2 (nematic) or S4 (tetratic) there" in said
+    assert (
+        "particles are in 2D and coloured by C4 (cubatic), expected S2 (nematic) or S4 (tetratic) there"
+        in said
+    )
     assert not out.exists()
 
 

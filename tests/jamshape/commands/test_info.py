@@ -131,6 +131,11 @@ def test_modes(jamshape, tiny):
     said = tiny[1]["modes.h5"].report
     assert (report["modes"], report["n_modes"]) == (said["n_modes"], said["n_modes"])
     assert sum(report["bands"].values()) == said["n_modes"] - said["n_translations"]
+    for name in ("bulk_modulus", "B_G_dc", "bordered_eigenvalue", "is_stable_to_shear"):
+        assert report[name] == said[name]
+    assert report["is_stable_to_shear"] in {True, False}
+    stable = "stable" if report["is_stable_to_shear"] else "unstable"
+    assert lines["moduli"].endswith(f", {stable} to shear")
     assert report["seed"] == 1
     assert lines["particles"].startswith("16 spherocylinders in 2D")
 

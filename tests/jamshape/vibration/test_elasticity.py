@@ -16,6 +16,7 @@ from jamshape.vibration.elasticity import moduli
 from jamshape.vibration.hessian import DynamicalMatrixOptions, dynamical_matrix
 from jamshape.vibration.spectrum import spectrum
 from jamshape.vibration.table import MODULI
+from jamshape.vibration.tensors import pressure_terms, strains_of
 
 U0 = 1e-8
 H = 1e-9  # strain: 1e-5 of an overlap
@@ -104,7 +105,7 @@ def floppy():
     raise AssertionError
 
 
-def strains_of(matrix):
+def coupling_of(matrix):
     """Simple shear: change of the forces at fixed positions, and the energy's second derivative."""
     given = matrix.strained(np.array([[[0.0, 1.0], [0.0, 0.0]]]))
     pushed = matrix.compatibility.T @ given.stretched[:, 0] + given.pushed[:, 0]
@@ -116,7 +117,7 @@ def test_floppy_modes_are_left_out():
     found = moduli(matrix, whole, (landscape, state))
     assert found.n_floppy == whole.is_floppy.sum() > 0
     assert [m.reason for m in found[:3]] == [""] * 3
-    pushed, affine = strains_of(matrix)
+    pushed, affine = coupling_of(matrix)
     values, vectors = np.linalg.eigh(matrix.matrix.toarray())
     stiff = np.argsort(np.abs(values))[found.n_floppy + matrix.translations.shape[1] :]
     left = affine - ((vectors[:, stiff].T @ pushed) ** 2 / values[stiff]).sum()
@@ -134,7 +135,7 @@ def test_floppy_modes_are_left_out():
 
 def test_a_floppy_mode_that_couples_leaves_no_modulus():
     _, _, matrix, whole = floppy()
-    pushed, _ = strains_of(matrix)
+    pushed, _ = coupling_of(matrix)
     firm = np.flatnonzero(whole.is_firm)
     k = firm[np.abs(whole.vectors[:, firm].T @ pushed).argmax()]  # made floppy
     v = whole.vectors[:, k]
@@ -147,6 +148,10 @@ def test_a_floppy_mode_that_couples_leaves_no_modulus():
     assert "to this strain (by " in found.simple_shear.reason
     assert "so nothing resists it" in found.simple_shear.reason
     assert found.simple_shear.affine == pytest.approx(moduli(matrix, whole).simple_shear.affine)
+    assert np.isnan(found.B["xyxy"].relaxed)
+    assert found.B["xyxy"].reason == found.simple_shear.reason
+    assert np.isnan(found.B.relaxed[:, 2]).all()
+    assert found.is_stable_to_shear is False  # a box that deforms along it meets no resistance
 
 
 @pytest.mark.parametrize("name", ["rods of alpha 1", "rods of alpha 4", "floppy"])
@@ -171,6 +176,33 @@ def test_rounding_is_bounded(name):
     assert error <= found.simple_shear.rounding + 1e-16 * abs(found.simple_shear.relaxed)
 
 
+@pytest.mark.parametrize("name", ["rods of alpha 1", "rods of alpha 4"])
+def test_rounding_of_tensors_is_bounded(name):
+    matrix = matrix_of(name, U0)
+    tensor, given = moduli(matrix).B, matrix.strained(strains_of(2))
+    with mpmath.workdps(DIGITS):
+        C, S = (
+            mpmath.matrix(part.toarray().tolist())
+            for part in (matrix.compatibility, matrix.prestress)
+        )
+        s, f, Z = (
+            mpmath.matrix(part.tolist())
+            for part in (given.stretched, given.pushed, matrix.translations)
+        )
+        push = C.T * s + f
+        beside = C.T * C - S + Z * Z.T
+        columns = [mpmath.lu_solve(beside, -push[:, k]) for k in range(3)]
+        rise = s.T * s + mpmath.matrix([[(push[:, k].T * x)[0] for x in columns] for k in range(3)])
+        virial = matrix.contacts["separation"].T @ matrix.contacts["force"]
+        weights = pressure_terms(2).B
+        for k, m in np.ndindex(3, 3):
+            exact = (rise[k, m] + float(given.affine[k, m]) + (weights[k, m] * virial).sum()) / (
+                mpmath.mpf(matrix.volume)
+            )
+            error = float(abs(exact - tensor.relaxed[k, m]))
+            assert error <= tensor.rounding[k, m] + 1e-16 * abs(tensor.relaxed[k, m])
+
+
 @pytest.mark.parametrize("name", ["discs", "rods of alpha 4"])
 def test_what_a_residual_changes_is_bounded(name):
     landscape, minimum = jammed(name, U0)
@@ -184,6 +216,10 @@ def test_what_a_residual_changes_is_bounded(name):
     for own, other in zip(found[:3], exact[:3], strict=True):
         change = abs(own.relaxed - other.relaxed)
         assert 1e-12 * abs(other.relaxed) < change <= own.bound < 1e-3 * abs(other.relaxed)
+    for name in ("B", "C"):
+        own, other = getattr(found, name), getattr(exact, name)
+        assert (np.abs(own.relaxed - other.relaxed) <= own.bound).all()
+        assert own.bound.max() < 1e-3 * np.abs(other.relaxed).max()
 
 
 def test_a_state_that_is_no_minimum_has_no_moduli():
