@@ -180,9 +180,15 @@ def draws(n: int) -> Iterator[IntArray]:
         yield random.integers(0, n, n)
 
 
+def mean_of(columns: FloatArray) -> FloatArray:
+    """Average (m, k) samples without those that are NaN; NaN where all are."""
+    known = np.isfinite(columns)
+    count = known.sum(axis=0)
+    total = np.where(known, columns, 0).sum(axis=0)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
 def mean_and_error(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Average (m, k) samples, without NaN; the standard error by the bootstrap."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of columns that are all NaN
-        drawn = [np.nanmean(columns[k], axis=0) for k in draws(len(columns))]
-        return np.nanmean(columns, axis=0), np.nanstd(drawn, axis=0)
+    """Average (m, k) samples; the standard error by the bootstrap, NaN where a draw has none."""
+    drawn = [mean_of(columns[k]) for k in draws(len(columns))]
+    return mean_of(columns), np.std(drawn, axis=0)

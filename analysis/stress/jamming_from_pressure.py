@@ -184,6 +184,12 @@ def figure_from(pairs: dict[str, list[Pair]], n: int) -> Figure:
     return figure
 
 
+def mean_of(values: Sequence[float]) -> Onset:
+    """Average over seeds, with the standard error."""
+    error = np.std(values, ddof=1) / len(values) ** 0.5 if len(values) > 1 else np.nan
+    return Onset(float(np.mean(values)), float(error))
+
+
 def summary(of: list[Pair]) -> dict[str, Any]:
     """Describe a shape in JSON."""
     same = [one for one in of if one.is_same and one.reached]
@@ -191,10 +197,7 @@ def summary(of: list[Pair]) -> dict[str, Any]:
         "by_pressure": [one.by_pressure.value for one in of],
         "by_energy": [one.by_energy.value for one in of],
     }
-    means = {
-        name: Onset(float(np.mean(v)), float(np.std(v, ddof=1) / len(v) ** 0.5))
-        for name, v in onsets.items()
-    }
+    means = {name: mean_of(values) for name, values in onsets.items()}
     return {
         "samples": len(of),
         "reached": sum(one.reached for one in of),

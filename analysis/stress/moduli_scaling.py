@@ -33,6 +33,7 @@ from common.stressed import (
     draws,
     found_of,
     mean_and_error,
+    mean_of,
     pressures_of,
     table_of,
 )
@@ -58,15 +59,18 @@ class Fit(NamedTuple):
 
 
 def fitted(p: FloatArray, G: FloatArray, error: FloatArray) -> Fit:
-    """Fit by weighted least squares: a line in p^beta for each beta."""
-    best = Fit(np.nan, np.nan, np.nan, np.inf)
-    for beta in _BETAS:
-        design = np.column_stack([np.ones_like(p), p**beta]) / error[:, None]
-        (G_0, c), *_ = np.linalg.lstsq(design, G / error)
-        chi2 = float((((G - G_0 - c * p**beta) / error) ** 2).sum())
-        if chi2 < best.chi2:
-            best = Fit(float(G_0), float(c), float(beta), chi2)
-    return best
+    """Fit by weighted least squares: a line in p^beta for each beta; NaN from fewer than three points."""
+    if len(p) < 3:
+        return Fit(*[np.nan] * 4)
+    weight = error**-2 / (error**-2).sum()
+    x = p ** _BETAS[:, None]
+    x_mean, G_mean = x @ weight, G @ weight
+    off = x - x_mean[:, None]
+    c = (off * (G - G_mean)) @ weight / (off**2 @ weight)
+    G_0 = G_mean - c * x_mean
+    chi2 = (((G - G_0[:, None] - c[:, None] * x) / error) ** 2).sum(axis=1)
+    best = int(np.argmin(chi2))
+    return Fit(float(G_0[best]), float(c[best]), float(_BETAS[best]), float(chi2[best]))
 
 
 class Average(NamedTuple):
@@ -108,7 +112,7 @@ def scaling_of(alpha: float, n: int, table: Table, last: float) -> Scaling:
     """Average and fit."""
     G, p = table.column("G"), table.pressures
     averages = {name: average_of(p, of, last) for name, of in columns_of(table).items()}
-    positive = (G > 0).sum(axis=0) / np.isfinite(G).sum(axis=0)
+    positive = mean_of(np.where(np.isfinite(G), G > 0, np.nan))
     undefined = np.isnan(G).mean(axis=0)
     return Scaling(alpha, n, len(G), p, averages, positive, undefined, last)
 
@@ -116,10 +120,8 @@ def scaling_of(alpha: float, n: int, table: Table, last: float) -> Scaling:
 def average_of(p: FloatArray, G: FloatArray, last: float) -> Average:
     """Average (m, k) moduli and fit, up to a pressure; a fifth of the draws is fitted."""
     mean, error = mean_and_error(G)
-    of = p <= last * (1 + 1e-9)
-    drawn = [
-        fitted(p[of], np.nanmean(G[k][:, of], axis=0), error[of]) for k in list(draws(len(G)))[::5]
-    ]
+    of = (p <= last * (1 + 1e-9)) & (error > 0)
+    drawn = [fitted(p[of], mean_of(G[k][:, of]), error[of]) for k in list(draws(len(G)))[::5]]
     return Average(mean, error, fitted(p[of], mean[of], error[of]), Fit(*np.std(drawn, axis=0)))
 
 

@@ -35,6 +35,7 @@ from common.stressed import (
     draws,
     found_of,
     mean_and_error,
+    mean_of,
     pressures_of,
     table_of,
 )
@@ -100,7 +101,7 @@ def size_of(n: int, tables: dict[str, Table]) -> Size:
 def _share(is_so: FloatArray) -> FloatArray:
     """(2, k) share of known packings, with the error of a binomial distribution; half a packing at least."""
     known = np.isfinite(is_so).sum(axis=0)
-    share = np.nansum(is_so, axis=0) / known
+    share = mean_of(is_so)
     inner = np.clip(share, 0.5 / known, 1 - 0.5 / known)
     return np.array([share, np.sqrt(inner * (1 - inner) / known)])
 
@@ -124,7 +125,7 @@ def slope_of(tables: dict[int, Table], large: float, small: float) -> Slope:
         for of in _drawn(tables)
     ]  # fmt: skip
     power, plateau = _slope({n: t.column("G_dc") for n, t in tables.items()}, tables, large, small)
-    errors = np.nanstd(drawn, axis=0)
+    errors = np.std(drawn, axis=0)
     return Slope(power, float(errors[0]), plateau, float(errors[1]), large, small)
 
 
@@ -136,7 +137,7 @@ def _slope(
     G: dict[int, FloatArray], tables: dict[int, Table], large: float, small: float
 ) -> tuple[float, float]:
     x = np.concatenate([table.pressures * n**2 for n, table in tables.items()])
-    y = np.concatenate([n * np.nanmean(G[n], axis=0) for n in tables])
+    y = np.concatenate([n * mean_of(G[n]) for n in tables])
     of = (x > large) & (y > 0)
     power = np.polyfit(np.log(x[of]), np.log(y[of]), 1)[0] if of.sum() > 1 else np.nan
     return float(power), float(y[x < small].mean()) if (x < small).any() else np.nan
