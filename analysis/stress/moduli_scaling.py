@@ -129,6 +129,8 @@ def figure_from(found: list[Scaling]) -> Figure:
     """Draw G on the left and G - G_0 on the right."""
     figure = figure_of(9.5, 4.6, dpi=160)
     left, right = figure.subplots(1, 2)
+    for axes in (left, right):
+        axes.set(xscale="log", yscale="log", xlabel=r"pressure $p$  $[k_e/R^2]$")
     for k, of in enumerate(found):
         for j, name in enumerate(DRAWN):
             style = marked(k + j * len(found))
@@ -140,9 +142,8 @@ def figure_from(found: list[Scaling]) -> Figure:
             _draw_power(right, of, name, style)
     left.set(ylabel=r"shear modulus $\langle G\rangle$  $[k_e/R^2]$")
     right.set(ylabel=r"$\langle G\rangle-G_0$  $[k_e/R^2]$")
-    for axes in (left, right):
-        axes.set(xscale="log", yscale="log", xlabel=r"pressure $p$  $[k_e/R^2]$")
-        axes.legend(fontsize=7)
+    left.legend(fontsize=7)
+    right.legend(fontsize=7)
     names = ", ".join(f"{of.alpha:g}" for of in found)
     figure.suptitle(
         rf"spherocylinders in 2D, $\alpha={names}$, $N={found[0].n}$, size ratio 1.4, compressed to $p$ in square boxes"
@@ -159,7 +160,7 @@ def _draw_power(axes: Axes, of: Scaling, name: str, style: dict[str, Any]) -> No
     axes.errorbar(of.p[own], above[own], average.error[own], **style)
     p = of.p[of.p <= of.last * (1 + 1e-9)]
     label = rf"$\alpha={of.alpha:g}$" + ", $G>0$" * (name != "all")
-    label += rf": $\beta={fit.beta:.2f}\pm{average.errors.beta:.2f}$"
+    label += rf": $\beta=${fit.beta:.2f}$\pm${average.errors.beta:.2f}"
     axes.plot(p, fit.c * p**fit.beta, "-", lw=0.9, color=style["color"], label=label)
 
 

@@ -164,7 +164,7 @@ def figure_from(sizes: list[Size], slope: Slope) -> Figure:
     labels = (
         ("share unstable to shear", "boxes of fixed shape"),
         ("contacts beyond $2N+1$", "boxes that yield freely"),
-        (r"$G_{dc}N$  $[k_e/R^2]$", rf"$G_{{dc}}N\sim(pN^2)^b$ at $pN^2>{slope.large:g}$, $b={slope.power:.2f}\pm${slope.power_error:.2f}"),
+        (r"$G_{dc}N$  $[k_e/R^2]$", rf"$G_{{dc}}N\sim(pN^2)^b$ at $pN^2>{slope.large:g}$, $b=${slope.power:.2f}$\pm${slope.power_error:.2f}"),
         (r"$K$  $[k_e/R^2]$", "boxes that yield freely"),
     )  # fmt: skip
     for axes, (name, title) in zip(panels.flat, labels, strict=True):

@@ -28,12 +28,12 @@ def test_exponents_are_found(monkeypatch):
 
 def test_moduli_are_averaged_and_kept(report, tmp_path):
     runs = tmp_path / "runs"
-    call = ("stress/moduli_scaling.py", "--n", 10, "--samples", 2, *SMALL, "--runs", runs)
+    call = ("stress/moduli_scaling.py", "--n", 10, "--samples", 3, *SMALL, "--runs", runs)
     found = report(*call, "--out", tmp_path / "one.png")["systems"]
     assert [of["alpha"] for of in found] == [0, 1]
-    assert all(of["samples"] == 2 and len(of["points"]) == 3 for of in found)
+    assert all(of["samples"] == 3 and len(of["points"]) == 3 for of in found)
     files = sorted(runs.glob("*.json"))
-    assert len(files) == 4
+    assert len(files) == 6
     discs = [json.loads(path.read_text()) for path in files if path.name.startswith("a0_")]
     G = [rows[0]["G"] for rows in discs]
     assert found[0]["points"][0]["G_all"] == pytest.approx(np.mean(G), rel=1e-12)
