@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import warnings
-from argparse import ArgumentParser
+from argparse import ArgumentParser, Namespace
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -66,6 +66,7 @@ def add_folder(parser: ArgumentParser, samples: int) -> None:
     parser.add_argument(
         "--runs", type=Path, default=Path("runs/stress"), help="folder of results (%(default)s)"
     )
+    parser.add_argument("--table", type=Path, help="file of all numbers, JSON (beside the figure)")
     parser.add_argument("--jobs", type=int, default=1, help="processes (%(default)s)")
     parser.add_argument(
         "--only-kept", action="store_true", help="draw from finished packings, make no others"
@@ -171,6 +172,12 @@ def table_of(folder: Path, series: Iterable[Series]) -> Table:
         msg = f"{folder} has no results of {every[0].file} and others, expected some; leave out --only-kept"
         raise ValueError(msg)
     return Table(np.array(every[0].pressures), rows)
+
+
+def write_table(options: Namespace, found: Any) -> None:
+    """Write all numbers of a figure."""
+    path = options.table or options.out.with_suffix(".json")
+    store(path, json.dumps(plain(found), indent=1).encode())
 
 
 def draws(n: int) -> Iterator[IntArray]:

@@ -24,14 +24,13 @@ import numpy as np
 
 import jamshape as js
 from jamshape.checks import NotReachedWarning
-from jamshape.command import parser_of, plain, report, run
+from jamshape.command import parser_of, report, run
 from jamshape.drawing.saving import save_figure
-from jamshape.files.disk import store
 from jamshape.shapes.particles import Particles
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.axes import figure_of
-from common.stressed import add_folder, found_of
+from common.stressed import add_folder, found_of, write_table
 from common.styles import marked
 
 if TYPE_CHECKING:
@@ -234,7 +233,7 @@ def main(options: Namespace) -> None:
             pairs[one.shape].append(pair_of(one.seed, json.loads(path.read_text())))
     save_figure(figure_from(pairs, options.n), options.out)
     found = {name: summary(of) for name, of in pairs.items()}
-    store(options.out.with_suffix(".json"), json.dumps(plain(found), indent=1).encode())
+    write_table(options, found)
     report({"out": options.out, "shapes": found})
 
 

@@ -11,7 +11,6 @@ repeated goes on. The last line of standard output is one JSON object.
 
 from __future__ import annotations
 
-import json
 import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
@@ -20,9 +19,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from jamshape.arrays import FloatArray
-from jamshape.command import parser_of, plain, report, run
+from jamshape.command import parser_of, report, run
 from jamshape.drawing.saving import save_figure
-from jamshape.files.disk import store
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.axes import figure_of
@@ -36,6 +34,7 @@ from common.stressed import (
     mean_of,
     pressures_of,
     table_of,
+    write_table,
 )
 from common.styles import marked
 
@@ -215,7 +214,7 @@ def main(options: Namespace) -> None:
     ]
     save_figure(figure_from(found), options.out)
     systems = [summary(of) for of in found]
-    store(options.out.with_suffix(".json"), json.dumps(plain(systems), indent=1).encode())
+    write_table(options, systems)
     report({"out": options.out, "systems": systems})
 
 

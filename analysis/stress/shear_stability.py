@@ -12,7 +12,6 @@ other. Finished packings are kept in --runs: a command that is stopped and repea
 
 from __future__ import annotations
 
-import json
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
@@ -22,9 +21,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from jamshape.arrays import FloatArray, IntArray
-from jamshape.command import parser_of, plain, report, run
+from jamshape.command import parser_of, report, run
 from jamshape.drawing.saving import save_figure
-from jamshape.files.disk import store
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.axes import figure_of
@@ -38,6 +36,7 @@ from common.stressed import (
     mean_of,
     pressures_of,
     table_of,
+    write_table,
 )
 from common.styles import marked
 
@@ -234,7 +233,7 @@ def main(options: Namespace) -> None:
     slope = slope_of({n: tables[n, FREE] for n in options.n}, options.large, options.small)
     save_figure(figure_from(sizes, slope), options.out)
     found = {"slope": slope, "sizes": [summary(of, np.array(pressures)) for of in sizes]}
-    store(options.out.with_suffix(".json"), json.dumps(plain(found), indent=1).encode())
+    write_table(options, found)
     report({"out": options.out, **found})
 
 
