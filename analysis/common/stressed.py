@@ -132,7 +132,7 @@ class Task(Protocol):
 
 
 def found_of(folder: Path, tasks: Sequence[Task], jobs: int, function: str = _COMPRESSED) -> None:
-    """Compute what the folder lacks; whoever stops this loses no finished task."""
+    """Compute all tasks without a file in the folder; an interruption keeps finished ones."""
     folder.mkdir(parents=True, exist_ok=True)
     missing: list[Any] = [one for one in tasks if not (folder / one.file).exists()]
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [_HERE, os.environ.get("PYTHONPATH")]))
@@ -164,7 +164,7 @@ class Table(NamedTuple):
 
 
 def table_of(folder: Path, series: Iterable[Series]) -> Table:
-    """Read what is there of series with the same pressures."""
+    """Read the finished ones of series with the same pressures."""
     every = list(series)
     paths = [folder / one.file for one in every]
     rows = [json.loads(path.read_text()) for path in paths if path.exists()]
@@ -188,7 +188,7 @@ def draws(n: int) -> Iterator[IntArray]:
 
 
 def mean_of(columns: FloatArray) -> FloatArray:
-    """Average (m, k) samples without those that are NaN; NaN where all are."""
+    """Average (m, k) samples, ignoring NaN; NaN where all are."""
     known = np.isfinite(columns)
     count = known.sum(axis=0)
     total = np.where(known, columns, 0).sum(axis=0)

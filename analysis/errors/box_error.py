@@ -119,7 +119,7 @@ def figure_from(curves: list[Curve], n: int) -> Figure:
     return figure
 
 
-def told(seconds: float) -> str:
+def formatted(seconds: float) -> str:
     """Format seconds, or that there are none."""
     return f"{seconds:.2g} s" if np.isfinite(seconds) else "-"
 
@@ -138,7 +138,7 @@ def table_of(curves: list[Curve]) -> str:
     return markdown(
         heads,
         [
-            (of.shape, f"{of.pressure:g}", *map(told, map(of.until, LEVELS)),
+            (of.shape, f"{of.pressure:g}", *map(formatted, map(of.until, LEVELS)),
              str(len(of.seconds)), f"{of.stress[-1]:.1e}", f"{of.residual[-1]:.1e}", of.outcome)
             for of in curves
         ],

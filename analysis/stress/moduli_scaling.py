@@ -94,9 +94,9 @@ class Scaling(NamedTuple):
     averages: dict[str, Average]
     """By `AVERAGES`."""
     positive: FloatArray
-    """(k,) share of packings of positive G."""
+    """(k,) fraction of packings of positive G."""
     undefined: FloatArray
-    """(k,) share of packings without a modulus: forces do not balance, or a floppy mode couples."""
+    """(k,) fraction of packings without a modulus: forces do not balance, or a floppy mode couples."""
     last: float
     """Highest pressure of the fit."""
 
@@ -173,7 +173,7 @@ def summary(of: Scaling) -> dict[str, Any]:
         for name, one in of.averages.items()
     }  # fmt: skip
     points = [
-        {"pressure": p, "share_positive": of.positive[k], "share_undefined": of.undefined[k]}
+        {"pressure": p, "fraction_positive": of.positive[k], "fraction_undefined": of.undefined[k]}
         | {f"G_{name}": one.G[k] for name, one in of.averages.items()}
         | {f"G_{name}_error": one.error[k] for name, one in of.averages.items()}
         for k, p in enumerate(of.p)

@@ -56,7 +56,7 @@ class Size(NamedTuple):
     x: FloatArray
     """p N^2"""
     unstable: FloatArray
-    """(2, k) share of the packings in boxes of fixed shape."""
+    """(2, k) fraction of the packings in boxes of fixed shape."""
     undecided: int
     """Of these packings, at all pressures."""
     still_unstable: int
@@ -86,7 +86,7 @@ def size_of(n: int, tables: dict[str, Table]) -> Size:
         n=n,
         samples={box: len(table) for box, table in tables.items()},
         x=fixed.pressures * n**2,
-        unstable=_share(1 - stable),
+        unstable=_fraction(1 - stable),
         undecided=int((done[0] & np.isnan(stable)).sum()),
         still_unstable=int((done[1] & ~(free.column("is_stable") > 0)).sum()),
         excess={box: np.array(mean_and_error(one)) for box, one in excess.items()},
@@ -97,12 +97,12 @@ def size_of(n: int, tables: dict[str, Table]) -> Size:
     )
 
 
-def _share(is_so: FloatArray) -> FloatArray:
-    """(2, k) share of known packings, with the error of a binomial distribution; half a packing at least."""
+def _fraction(is_so: FloatArray) -> FloatArray:
+    """(2, k) fraction of known packings, with the error of a binomial distribution; half a packing at least."""
     known = np.isfinite(is_so).sum(axis=0)
-    share = mean_of(is_so)
-    inner = np.clip(share, 0.5 / known, 1 - 0.5 / known)
-    return np.array([share, np.sqrt(inner * (1 - inner) / known)])
+    fraction = mean_of(is_so)
+    inner = np.clip(fraction, 0.5 / known, 1 - 0.5 / known)
+    return np.array([fraction, np.sqrt(inner * (1 - inner) / known)])
 
 
 class Slope(NamedTuple):
@@ -161,7 +161,7 @@ def figure_from(sizes: list[Size], slope: Slope) -> Figure:
     y = biggest.G[0][-1] * (x / biggest.x[-1]) ** 0.5
     panels[1, 0].plot(x, y, "-", color="0.5", lw=0.9, label="slope 1/2")
     labels = (
-        ("share unstable to shear", "boxes of fixed shape"),
+        ("fraction unstable to shear", "boxes of fixed shape"),
         ("contacts beyond $2N+1$", "boxes that yield freely"),
         (r"$G_{dc}N$  $[k_e/R^2]$", rf"$G_{{dc}}N\sim(pN^2)^b$ at $pN^2>{slope.large:g}$, $b=${slope.power:.2f}$\pm${slope.power_error:.2f}"),
         (r"$K$  $[k_e/R^2]$", "boxes that yield freely"),
