@@ -19,7 +19,6 @@ from jamshape.command import plain
 from jamshape.files.disk import store
 from jamshape.landscape import Landscape, State
 from jamshape.minima.target import TargetError
-from jamshape.packing import Packing
 from jamshape.recording.workers import Workers
 from jamshape.vibration.elasticity import moduli
 from jamshape.vibration.hessian import NotAtMinimumError, dynamical_matrix
@@ -73,8 +72,9 @@ def add_folder(parser: ArgumentParser, samples: int) -> None:
     )
 
 
-def pressures_of(low: float, high: float, per_decade: int) -> tuple[float, ...]:
-    """List pressures at equal ratios, to four digits."""
+def pressures_of(options: Namespace) -> tuple[float, ...]:
+    """List the pressures of `add_options`, at equal ratios, to four digits."""
+    (low, high), per_decade = options.pressures, options.per_decade
     n = round(np.log10(high / low) * per_decade) + 1
     return tuple(float(f"{p:.4g}") for p in np.geomspace(low, high, n))
 
@@ -82,7 +82,7 @@ def pressures_of(low: float, high: float, per_decade: int) -> tuple[float, ...]:
 def compressed(*series: Any) -> list[dict[str, Any]]:
     """Make the packing of a `Series` at its lowest pressure, raise the pressure, and measure at each."""
     of, rows = Series(*series), []
-    packing: Packing | None = None
+    packing: js.Packing | None = None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NotReachedWarning)  # rows tell
         for p in of.pressures:
@@ -94,7 +94,7 @@ def compressed(*series: Any) -> list[dict[str, Any]]:
     return rows
 
 
-def _led(packing: Packing | None, of: Series, pressure: float) -> Packing:
+def _led(packing: js.Packing | None, of: Series, pressure: float) -> js.Packing:
     if packing is not None:
         return js.minimise(packing, pressure=pressure, box=of.box, progress=False)
     particles = js.Spherocylinders(alpha=of.alpha)
@@ -103,7 +103,7 @@ def _led(packing: Packing | None, of: Series, pressure: float) -> Packing:
     )
 
 
-def measured(packing: Packing) -> dict[str, Any]:
+def measured(packing: js.Packing) -> dict[str, Any]:
     """Measure a packing at a minimum; moduli that are not defined are NaN."""
     found: dict[str, Any] = {"reached": packing.reached, "phi": packing.phi, "u": packing.u}
     if not packing.reached:
@@ -177,7 +177,7 @@ def table_of(folder: Path, series: Iterable[Series]) -> Table:
 def write_table(options: Namespace, found: Any) -> None:
     """Write all numbers of a figure."""
     path = options.table or options.out.with_suffix(".json")
-    store(path, json.dumps(plain(found), indent=1).encode())
+    store(path, f"{json.dumps(plain(found), indent=1)}\n".encode())
 
 
 def draws(n: int) -> Iterator[IntArray]:

@@ -28,7 +28,6 @@ from jamshape.files.disk import store
 from jamshape.landscape import Landscape, State
 from jamshape.minima.boxes import FREE, Settling, Yielding, advance
 from jamshape.minima.target import TargetError
-from jamshape.packing import Packing
 from jamshape.shapes.particles import Particles
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -73,7 +72,7 @@ class Curve(NamedTuple):
         return float(reached[0]) if len(reached) else np.nan
 
 
-def curve_of(label: str, start: Packing, pressure: float) -> Curve:
+def curve_of(label: str, start: js.Packing, pressure: float) -> Curve:
     """Lead a packing to a pressure, and record errors."""
     landscape, at = Landscape(start), Settling(State.of(start))
     goal, rows, outcome = Yielding(FREE, pressure=pressure), [], "reached"
@@ -97,7 +96,7 @@ def curve_of(label: str, start: Packing, pressure: float) -> Curve:
 def figure_from(curves: list[Curve], n: int) -> Figure:
     """Draw a panel for each shape."""
     shapes = list(dict.fromkeys(of.shape for of in curves))
-    figure = figure_of(3.6 * len(shapes), 3.9)
+    figure: Figure = figure_of(3.6 * len(shapes), 3.9)
     panels = figure.subplots(1, len(shapes), squeeze=False, sharey=True)[0]
     for axes, name in zip(panels, shapes, strict=True):
         own = [of for of in curves if of.shape == name]
@@ -167,7 +166,7 @@ def main(options: Namespace) -> None:
         curves += [curve_of(shape.label, start, p) for p in options.pressures]
     save_figure(figure_from(curves, options.n), options.out)
     print(table_of(curves))
-    store(options.out.with_suffix(".json"), json.dumps(plain(curves), indent=1).encode())
+    store(options.out.with_suffix(".json"), f"{json.dumps(plain(curves), indent=1)}\n".encode())
     named = [
         {"name": f"p = {of.pressure:g}, {of.shape}", "seconds": of.seconds, "error": of.stress}
         for of in curves

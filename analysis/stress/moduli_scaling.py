@@ -196,7 +196,7 @@ def parser() -> ArgumentParser:
 
 def main(options: Namespace) -> None:
     """Make, average, fit, draw, report."""
-    pressures = pressures_of(*options.pressures, options.per_decade)
+    pressures = pressures_of(options)
     seeds = range(1, options.samples + 1)
     every = [
         Series(alpha, options.n, "isotropic", seed, pressures)

@@ -215,7 +215,7 @@ def parser() -> ArgumentParser:
 
 def main(options: Namespace) -> None:
     """Make, average, draw, report."""
-    pressures = pressures_of(*options.pressures, options.per_decade)
+    pressures = pressures_of(options)
     seeds = range(1, options.samples + 1)
     every = {
         (n, box): [Series(0.0, n, box, seed, pressures) for seed in seeds]
