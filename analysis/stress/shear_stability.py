@@ -171,6 +171,7 @@ def figure_from(sizes: list[Size], slope: Slope) -> Figure:
         axes.set_title(title, fontsize=9)
         axes.legend(fontsize=7)
     panels[0, 1].set_yscale("symlog", linthresh=1)
+    panels[0, 1].set_ylim(-0.3, 1.5 * max(of.excess[FREE][0][-1] for of in sizes))
     panels[1, 0].set_yscale("log")
     panels[1, 1].set_ylim(bottom=0)
     figure.suptitle(
