@@ -1,4 +1,4 @@
-"""Compress particles of any shape in the plane through jamming at any rate, however slow; record p(phi).
+"""Compress particles of any shape through jamming at any rate, however slow; record p(phi).
 
     python pyscripts/slow_compress.py --alpha 4 --n 256 --kappa 1e-9 --phi-end 0.88 --out slow.h5
 

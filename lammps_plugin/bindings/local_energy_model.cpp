@@ -243,6 +243,9 @@ void export_local_energy_model(nb::module_ &m)
             of.share(static_cast<std::size_t>(threads));
           },
           "threads"_a, "Set the number of threads of sums over contacts, 1 at first.")
+      .def("follow_bodies", &LocalEnergyModel::follow_bodies,
+           "From now on rotations in 3D are about the axes of each body at the base, not those of\n"
+           "space, and factors solve equations, by iteration where they are incomplete.")
       .def("evaluate", &evaluate, "x"_a, "strain"_a, "extended"_a,
            "Return energy, gradient (n,), derivative with respect to the strain, sum of the\n"
            "magnitudes of bond forces, number of bonds, and the index of a pair that crosses and "

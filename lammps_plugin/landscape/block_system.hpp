@@ -3,10 +3,12 @@
 #include "landscape/block_factors.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <Eigen/Core>
 #include <memory>
+#include <utility>
 #include <vector>
 
 namespace jamshape {
@@ -23,6 +25,8 @@ class BlockSystem {
   virtual Eigen::VectorXd times(const Eigen::Ref<const Eigen::VectorXd> &vector) const = 0;
   /// Factors of the matrix plus a diagonal (n,); null if a pivot is not positive.
   virtual std::shared_ptr<Factors> factors(const Eigen::VectorXd &added) = 0;
+  /// The same with solutions by iteration, to a small residual, if factors are incomplete.
+  virtual std::shared_ptr<Factors> iterated(const Eigen::VectorXd &added) = 0;
 };
 
 /// Layout of a block system: N particles, whose at most `most` coordinates have the numbers column
@@ -33,6 +37,52 @@ struct BlockPlan {
   std::size_t N;
   int most;
   Fill fill;
+};
+
+/// A matrix whose equations are solved by conjugate gradients, preconditioned with incomplete
+/// factors. Where it is not positive definite, a solution ends at the direction that shows it.
+template <int BLOCK> class IteratedFactors : public Factors {
+ public:
+  IteratedFactors(std::shared_ptr<const BlockPattern> of, const BlockKernels &compiled,
+                  BlockMatrix<BLOCK> of_equations, std::shared_ptr<BlockFactors<BLOCK>> nearly) :
+      pattern(std::move(of)), kernels(compiled), matrix(std::move(of_equations)),
+      near(std::move(nearly))
+  {
+  }
+
+  std::size_t size() const override { return pattern->n; }
+
+  Eigen::VectorXd solve(const Eigen::Ref<const Eigen::VectorXd> &right) const override
+  {
+    Eigen::VectorXd x = Eigen::VectorXd::Zero(right.size());
+    Eigen::VectorXd rest = right, preconditioned = near->solve(rest), along = preconditioned;
+    double product = rest.dot(preconditioned);
+    const double enough = REMAINDER * REMAINDER * product;
+    for (Eigen::Index k = 0; k < right.size() && product > enough; ++k) {
+      BlockRows<BLOCK> from(*pattern, along), to(*pattern);
+      kernels.multiply(matrix.view(*pattern), from.data(), to.data());
+      const Eigen::VectorXd pulled = to.gathered();
+      const double curvature = along.dot(pulled);
+      if (!(curvature > 0.0)) return k > 0 ? x : along;
+      const double length = product / curvature;
+      x += length * along;
+      rest -= length * pulled;
+      preconditioned = near->solve(rest);
+      const double next = rest.dot(preconditioned);
+      along = preconditioned + (next / product) * along;
+      product = next;
+    }
+    return x;
+  }
+
+ private:
+  /// Relative residual, in the norm of the preconditioner: Newton's method corrects what it leaves.
+  static constexpr double REMAINDER = 1e-5;
+
+  std::shared_ptr<const BlockPattern> pattern;
+  BlockKernels kernels;
+  BlockMatrix<BLOCK> matrix;
+  std::shared_ptr<BlockFactors<BLOCK>> near;
 };
 
 /// Block system of particles with only their first BLOCK coordinates.
@@ -101,7 +151,31 @@ template <int BLOCK> class BlockSystemOf : public BlockSystem {
     return found->factorise(hessian, rows) ? found : nullptr;
   }
 
+  std::shared_ptr<Factors> iterated(const Eigen::VectorXd &added) override
+  {
+    BlockMatrix<BLOCK> matrix = hessian;
+    const BlockRows<BLOCK> rows(*pattern, added);
+    for (std::size_t j = 0; j < pattern->size(); ++j) {
+      for (int k = 0; k < BLOCK; ++k) matrix.diagonal[j](k, k) += rows.row(j)[k];
+    }
+    const double largest = (diagonal() + added).cwiseAbs().maxCoeff();
+    const std::shared_ptr<BlockFactors<BLOCK>> near = spare();
+    // The preconditioner alone is shifted where its pivots need it.
+    for (double shift = 0.0; std::isfinite(shift);
+         shift = std::max(10.0 * shift, INCOMPLETE * largest)) {
+      const Eigen::VectorXd shifts =
+          Eigen::VectorXd::Constant(static_cast<Eigen::Index>(pattern->n), shift);
+      if (near->factorise(matrix, BlockRows<BLOCK>(*pattern, shifts))) {
+        return std::make_shared<IteratedFactors<BLOCK>>(pattern, kernels, std::move(matrix), near);
+      }
+    }
+    return nullptr;
+  }
+
  private:
+  /// Smallest shift of incomplete factors, over the largest diagonal element, if pivots need one.
+  static constexpr double INCOMPLETE = 1e-4;
+
   using Block = BlockOf<BLOCK>;
   int most;
   std::vector<std::int64_t> pairs;

@@ -115,6 +115,11 @@ class LocalEnergyModel {
   /// results depend on the points before; for points that follow one another.
   virtual void remember(bool contacts) = 0;
 
+  /// From now on rotations in 3D are about the axes of each body at the base, where its drag is
+  /// diagonal, instead of those of space, and factors solve equations, by iteration where they are
+  /// incomplete: for stages of a flow.
+  virtual void follow_bodies() = 0;
+
   /// Sets the number of threads of sums over contacts, if there are enough: the last bits depend on
   /// this number, but on nothing else.
   virtual void share(std::size_t threads) = 0;
@@ -238,6 +243,12 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     starts.assign(pairs.list().n, {});
   }
 
+  void follow_bodies() override
+  {
+    along_bodies = true;
+    hessian = nullptr;
+  }
+
   void share(std::size_t threads) override
   {
     team = threads > 1 ? std::make_unique<Team>(threads) : nullptr;
@@ -282,6 +293,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     const TurnedBodies<Model, D, double> turned_bodies(posed);
     hessian->clear();
     pulled = Eigen::VectorXd::Zero(n());
+    find_axes(at);
     Team *const by = team_for(posed.size());
     curved.resize(parts_of(by));
     in_parts(by, posed.size(), [&](std::size_t k, const Range &part) {
@@ -323,13 +335,15 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
 
   std::shared_ptr<Factors> factors(const Eigen::VectorXd &added) override
   {
-    return hessian->factors(added);
+    return along_bodies && fill() == Fill::NONE ? hessian->iterated(added)
+                                                : hessian->factors(added);
   }
 
  private:
   static constexpr int BLOCK = D + ROTATIONS<D>;
   static constexpr int VARIABLES = PAIR_VARIABLES<D>;
   static constexpr int TURNS = D == 2 ? 1 : 4;  // per orientation
+  using TurnMatrix = Eigen::Matrix<double, ROTATIONS<D>, ROTATIONS<D>>;
   using DualContact = ContactOf<Model, D, Dual<VARIABLES>>;
   using Start = typename Model::template Start<D>;
   using PairMatrix = Eigen::Matrix<double, VARIABLES, VARIABLES>;
@@ -362,7 +376,8 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   NearPairs wide, pairs;             // `pairs` are those of `wide` that are within `skin`
   std::vector<std::int64_t> chosen;  // (M,) their indices in `wide`
   double skin = 0.0;
-  bool remembers = false;
+  bool remembers = false, along_bodies = false;
+  std::vector<TurnMatrix> axes;  // (N,) of the Hessian's rotations in space; empty if these are its
   mutable std::vector<Start> starts;  // (M,) of `pairs`
   bool is_outrun = false;             // `pairs` do not hold at a point, and `wide` neither
   Laws<Law> laws;
@@ -416,7 +431,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   {
     Eigen::VectorXd found = Eigen::VectorXd::Zero(n());
     for (std::size_t i = 0; i < shapes.size(); ++i) {
-      const Torque<D, S> turning = by_turn(turn(at, i), sums.torque[i]);
+      const Torque<D, S> turning = about_axes(i, by_turn(turn(at, i), sums.torque[i]));
       for (int k = 0; k < BLOCK; ++k) {
         const std::int64_t c = coordinates.column[BLOCK * i + k];
         if (c < 0) continue;
@@ -441,6 +456,43 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   template <class S> static Vec<3> doubles(const Vec<3, S> &v)
   {
     return {{static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])}};
+  }
+
+  /// Body axis of a particle at the base.
+  Vec<3> axis_of(std::size_t i, int b) const
+  {
+    const double *const q = &base.orientation[0][TURNS * i];
+    return body_axis(Quaternion{q[0], q[1], q[2], q[3]}, b);
+  }
+
+  /// Components of a torque in space along the axes of the rotations.
+  template <class S> Torque<D, S> about_axes(std::size_t i, const Torque<D, S> &torque) const
+  {
+    if constexpr (D == 3) {
+      if (along_bodies && turns(i)) {
+        Torque<D, S> found;
+        for (int b = 0; b < 3; ++b) found[b] = dot(constants_of<S>(axis_of(i, b)), torque);
+        return found;
+      }
+    }
+    return torque;
+  }
+
+  /// The derivatives of rotations in space by the coordinates at a point, in radians, if these are
+  /// about body axes: there also the motion to the point counts.
+  void find_axes(const Displacement &at)
+  {
+    if constexpr (D == 3) {
+      if (!along_bodies) return;
+      axes.assign(shapes.size(), TurnMatrix::Identity());
+      for (std::size_t i = 0; i < shapes.size(); ++i) {
+        const Vec<3> back = -1.0 * turn(at, i);
+        for (int b = 0; b < 3 && turns(i); ++b) {
+          const Vec<3> axis = torque_on_rotation_vector(back, axis_of(i, b));
+          std::copy_n(axis.c, 3, axes[i].col(b).data());
+        }
+      }
+    }
   }
 
   /// Growth of the box since a list was made: the map from its cell vectors then to those now,
@@ -578,12 +630,17 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     return by;
   }
 
-  /// Rotation vector of a particle.
+  /// Rotation vector of a particle, in space coordinates.
   Torque<D> turn(const Displacement &at, std::size_t i) const
   {
     Torque<D> by;
     for (int k = 0; k < ROTATIONS<D>; ++k) {
       by[k] = component(at, i, D + k) * coordinates.radians_per_length[i];
+    }
+    if constexpr (D == 3) {
+      if (along_bodies && turns(i)) {
+        return by[0] * axis_of(i, 0) + by[1] * axis_of(i, 1) + by[2] * axis_of(i, 2);
+      }
     }
     return by;
   }
@@ -746,15 +803,29 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
                        by(variable(a / BLOCK, a % BLOCK), variable(b / BLOCK, b % BLOCK));
       }
     }
-    hessian->add(p, scaled.data());
     // The affine strain displaces i relative to j in proportion to r.
+    Eigen::Matrix<double, BLOCK, 1> pull[2];
+    for (int side = 0; side < 2; ++side) {
+      for (int k = 0; k < BLOCK; ++k) {
+        double along = 0.0;
+        for (int d = 0; d < D; ++d) along += by(variable(side, k), d) * r[d];
+        pull[side][k] = scale[side][k] * along;
+      }
+      if (axes.empty()) continue;
+      const TurnMatrix &to = axes[pairs.particles[2 * p + side]];
+      constexpr int TURN = ROTATIONS<D>;
+      const int first = BLOCK * side + D;
+      pull[side].template tail<TURN>() = (to.transpose() * pull[side].template tail<TURN>()).eval();
+      scaled.template middleRows<TURN>(first) =
+          (to.transpose() * scaled.template middleRows<TURN>(first)).eval();
+      scaled.template middleCols<TURN>(first) =
+          (scaled.template middleCols<TURN>(first) * to).eval();
+    }
+    hessian->add(p, scaled.data());
     for (int side = 0; side < 2; ++side) {
       for (int k = 0; k < BLOCK; ++k) {
         const std::int64_t c = coordinates.column[BLOCK * pairs.particles[2 * p + side] + k];
-        if (c < 0) continue;
-        double along = 0.0;
-        for (int d = 0; d < D; ++d) along += by(variable(side, k), d) * r[d];
-        pulled[c] += scale[side][k] * along;
+        if (c >= 0) pulled[c] += pull[side][k];
       }
     }
   }

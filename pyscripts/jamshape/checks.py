@@ -40,7 +40,9 @@ class _Typed(NamedTuple):
         """Format with the value, or with the spec ``name`` without; true options need no value."""
         if self.is_option:
             option = f"--{_OPTIONS.get(self.name, self.name).replace('_', '-')}"
-            return option if spec == "name" or self.value is True else f"{option} {self.value}"
+            # A packing that a command has read was typed as its file.
+            value = getattr(self.value, "file", None) or self.value
+            return option if spec == "name" or value is True else f"{option} {value}"
         value = str(self.value) if isinstance(self.value, Path) else self.value
         return self.name if spec == "name" else f"{self.name}={_shown(value)}"
 
@@ -176,6 +178,7 @@ RANGES = {
     "cycles": Range(1, _COUNT, "cycles", whole=True),
     "pure_strain": Range(1e-12, 3.0, "a strain of pure shear"),
     "strain_step": Range(1e-12, 0.1, "a step of the strain"),
+    "stress_step": Range(1e-14, 1.0, "a step of the stress"),
     "strain_end": Range(1e-12, 1e6, "a strain"),
     "hold_pressure": Range(1e-12, 1.0, "a pressure", also=(0.0,)),
     "phi": Range(1e-6, 2.0, "a packing fraction"),

@@ -40,8 +40,11 @@ DIMERS = js.Dimers(alpha=1)
 BODIES = js.Superellipsoids(w1=0.6)
 
 
-def in_turn(*columns: Any) -> list[Any]:
-    """Return all combinations of parameters; in the default suite only those that take turns: each value occurs."""
+def in_turn(*columns: Any, kept: Container[str] | None = None) -> list[Any]:
+    """Return all combinations of parameters; in the default suite only those that take turns: each value occurs.
+
+    With `kept` the default suite takes only these of the first ones.
+    """
     every = []
     for numbers in itertools.product(*(range(len(column)) for column in columns)):
         values = [column[k] for column, k in zip(columns, numbers, strict=True)]
@@ -49,6 +52,7 @@ def in_turn(*columns: Any) -> list[Any]:
         is_quick = all(
             k == first % len(column) for k, column in zip(others, columns[1:], strict=True)
         )
+        is_quick &= kept is None or values[0] in kept
         every.append(pytest.param(*values, marks=() if is_quick else pytest.mark.validate))
     return every
 
@@ -168,7 +172,7 @@ DRIVERS = {
     ),
     "cyclic shear in LAMMPS": Case(
         "cyclic_shear", "rods",  # its box takes other cell vectors, to and fro
-        {"amplitude": 0.6, "period": 240.0, "cycles": 2, "rows": 20},
+        {"amplitude": 0.6, "period": 240.0, "cycles": 2, "rows": 12},
         {"amplitude": 0.5, "period": 250.0, "cycles": 3, "flow": "pure", "rows": 16, "frames": 1,
          "integrator": "heun/adaptive", "integration_tolerance": 1e-3, "sides": 1},
         {"period": 4e7, "rows": 1_000_000},
@@ -229,6 +233,13 @@ CASES = DRIVERS | {
         "shear", "rods",
         {"gdot": 1e-3, "strain": 0.05, "flow": "pure", "integrator": "tr-bdf2", "integration_tolerance": 1e-2, "rows": 20},
     ),
+    "implicit compression in space": Case(
+        "slow_compress", "bodies", {"phi": (None, 0.752), "kappa": 1e-4},
+    ),
+    "implicit shear in space": Case(
+        "shear", "bodies",
+        {"gdot": 1e-3, "strain": 0.06, "integrator": "tr-bdf2", "integration_tolerance": 1e-2, "rows": 20},
+    ),
     "quasistatic pure shear at a pressure": Case(
         "quasistatic_shear", "dimers",
         {"step": 4e-3, "strain": 0.04, "flow": "pure", "pressure": 1e-3, "frames": 3},
@@ -236,6 +247,17 @@ CASES = DRIVERS | {
     "cyclic quasistatic shear": Case(
         "quasistatic_shear", "dimers", {"step": 1e-2, "amplitude": 0.06, "cycles": 2, "frames": 3},
         {"step": 2e-2, "amplitude": 0.05, "cycles": 3},
+    ),
+    "quasistatic shear at a normal stress": Case(
+        "quasistatic_shear", "dimers", {"step": 4e-3, "strain": 0.04, "pressure": 1e-3, "box": "yy", "frames": 3},
+    ),
+    "quasistatic shear by the stress": Case(
+        "quasistatic_shear", "dimers", {"stress_step": 6e-4, "strain": 0.05, "frames": 3},
+        {"stress_step": 7e-4},
+    ),
+    "ladder in pressure": Case(
+        "ladder", "dimers", {"pressure": (1e-3, 1e-4, 1e-3), "box": "free"},
+        {"pressure": (1e-3, 1e-4), "box": "isotropic"}, {}, "packing",
     ),
     "quasistatic shear in space": Case(
         "quasistatic_shear", "bodies", {"step": 1e-2, "strain": 0.1, "frames": 3}

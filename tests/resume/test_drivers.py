@@ -41,6 +41,8 @@ from jamshape.files.h5md import FileFormatError, read_attributes
 pytestmark = pytest.mark.lammps
 
 OTHER = "another process writes this file, expected to be the only one"
+RECORDED = ("shear in LAMMPS", "implicit compression", "quasistatic shear")
+"""Drivers of the default suite where the recorder alone is at work, the same for all; the others are validated."""
 ALONE = {"run.h5", "said.log"}  # what a run in a process of its own leaves
 
 
@@ -241,7 +243,7 @@ def test_a_second_signal_ends_a_run_at_once(name, signal_and_code, starts, tmp_p
 # --- two runs on one file -------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", DRIVERS)
+@pytest.mark.parametrize("name", quick(DRIVERS, RECORDED))
 def test_a_second_start_is_one_sentence_and_changes_nothing(name, starts, tmp_path):
     file, link = tmp_path / "run.h5", tmp_path / "a link"
     link.symlink_to(file)
@@ -260,7 +262,7 @@ def test_a_second_start_is_one_sentence_and_changes_nothing(name, starts, tmp_pa
     process.join()
 
 
-@pytest.mark.parametrize("name", DRIVERS)
+@pytest.mark.parametrize("name", quick(DRIVERS, RECORDED))
 def test_two_starts_with_other_settings_never_mix(name, whole, starts, tmp_path, patched):
     """Both at once, killed, and then both again: one file, one run."""
     expected, _, seconds, _ = whole(name)
@@ -324,7 +326,7 @@ def test_another_packing_of_the_same_density_is_refused(tmp_path):
         js.quasistatic_shear(start=turned, **how)
 
 
-@pytest.mark.parametrize("name", DRIVERS)
+@pytest.mark.parametrize("name", quick(DRIVERS, RECORDED))
 def test_again_begins_anew(name, whole, starts, tmp_path, patched):
     patched(*SHORT)
     file, (key, value) = tmp_path / "run.h5", next(iter(CASES[name].others.items()))
@@ -356,7 +358,7 @@ def limited(name, file, starts, most):
     CASES[name].run(file, starts)
 
 
-@pytest.mark.parametrize("name", DRIVERS)
+@pytest.mark.parametrize("name", quick(DRIVERS, RECORDED))
 def test_a_disk_without_room_leaves_the_last_checkpoint(name, whole, starts, tmp_path, patched):
     patched(*SHORT, *NONE)
     file = tmp_path / "run.h5"
@@ -389,7 +391,9 @@ def with_progress(name, file, starts, target):
     os._exit(0)  # multiprocessing would fail to flush it
 
 
-@pytest.mark.parametrize(("name", "target"), in_turn([*DRIVERS], ["/dev/full", "closed", "none"]))
+@pytest.mark.parametrize(
+    ("name", "target"), in_turn([*DRIVERS], ["/dev/full", "closed", "none"], kept=RECORDED)
+)
 def test_no_run_ends_for_its_standard_error(name, target, whole, starts, tmp_path):
     file = tmp_path / "run.h5"
     args = (name, file, starts, target)
@@ -397,7 +401,7 @@ def test_no_run_ends_for_its_standard_error(name, target, whole, starts, tmp_pat
     require_same(whole(name)[0], file)
 
 
-@pytest.mark.parametrize("name", DRIVERS)
+@pytest.mark.parametrize("name", quick(DRIVERS, RECORDED))
 def test_a_link_and_its_target_are_one_run(name, whole, starts, tmp_path, patched):
     patched(*SHORT, *NONE)
     (tmp_path / "there").mkdir()

@@ -24,6 +24,7 @@ from slopes import assert_is_slope
 from jamshape.contacts import find_contacts, forces, sum_forces
 from jamshape.landscape import CrossingError, Landscape
 from jamshape.landscape.local_energy_model import LocalEnergyModel
+from jamshape.minima.boxes import strains_of
 from jamshape.packing import Box, State
 
 
@@ -115,6 +116,28 @@ def test_strain_derivatives_are_slopes(packing):
     assert_is_slope(curvature.strain_hessian, lambda s: at(s).strain_gradient / (1 + s), h, stiff)
     scale = np.abs(curvature.coupling).max()
     assert_is_slope(curvature.coupling, lambda s: at(s).gradient, h, scale)
+
+
+def test_second_derivatives_by_every_strain_are_slopes(packing):
+    """Of the gradient, and of the stress that goes with each strain of the box."""
+    landscape, state, D = Landscape(packing), State.of(packing), packing.dimension
+    strains, h = strains_of("free", D), 1e-6
+    coupling, own = landscape.strained(state, strains)
+
+    def at(s, strain):
+        return state.deformed(np.eye(D, dtype=np.longdouble) + np.longdouble(s) * strain)
+
+    def slopes(s, strain):
+        there = at(s, strain)
+        deformed = np.linalg.inv(np.eye(D) + s * strain).T
+        return -there.volume * np.einsum("ab,kab->k", landscape.stress(there) @ deformed, strains)
+
+    for strain, row, column in zip(strains, coupling, own, strict=True):
+        gradient = partial(
+            lambda s, strain: landscape.evaluate(at(s, strain)).gradient, strain=strain
+        )
+        assert_is_slope(row, gradient, h, np.abs(coupling).max())
+        assert_is_slope(column, partial(slopes, strain=strain), h, np.abs(own).max())
 
 
 def test_the_virial_is_the_slope_of_the_energy_by_every_strain(packing):

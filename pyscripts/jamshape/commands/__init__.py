@@ -24,7 +24,7 @@ COMMANDS = {
     "compress": "compress particles through jamming; record p(phi) and snapshots",
     "pack": "make one mechanically stable packing at a chosen energy",
     "minimise": "minimise the energy of a state of your own",
-    "slow": "compress at any rate, however slow, in the plane; record p(phi)",
+    "slow": "compress at any rate, however slow; record p(phi)",
     "shear": "shear at a constant rate; record stress, order and snapshots",
     "cycle": "shear to and fro; record stress, and displacements from cycle to cycle",
     "aqs": "shear by small steps with a minimisation after each; record stress and its drops",

@@ -3,11 +3,15 @@
     jamshape aqs --alpha 4 --n 256 --phi 0.9 --step 1e-3 --strain 0.5 --out aqs.h5
 
     jamshape aqs --start packing.h5 --step 1e-3 --amplitude 0.05 --cycles 10 --out cycles.h5
+    jamshape aqs --start packing.h5 --pressure 1e-3 --box yy --step 1e-3 --strain 0.5 --out normal.h5
+    jamshape aqs --start packing.h5 --pressure 1e-3 --stress-step 1e-5 --out yield.h5
 
-Starts from the last frame of a packing or run file (--start), or compresses a random packing quasistatically to
---phi. The volume is held, or with --pressure the pressure. The last line of standard output is one JSON object: the
+Starts from the last frame of a file with particles (--start), or that of --frame, or compresses a random packing
+quasistatically to --phi. The volume is held, or with --pressure the pressure, or with --box a normal stress. With
+--stress-step the shear stress is raised instead of the strain, until the packing yields. The last line of standard output is one JSON object: the
 final stress, the modulus of the first step, averages over the steady state, and the stress drops, each with the
-strain and the stress before it, and the dissipated energy over the volume. not_at_rest counts rows in which forces do
+strain and the stress before it, and the dissipated energy over the volume; with --amplitude also per_cycle, as of
+`jamshape cycle`. not_at_rest counts rows in which forces do
 not balance to --tolerance; the exit code is 0 only if there are none. Needs no LAMMPS. The same command resumes an
 interrupted run and leaves a finished one alone; it refuses a file with other settings, unless --again replaces it.
 With --seconds it stops in time, before a queue ends it: the exit code is then 75.
@@ -44,6 +48,9 @@ def main(options: Namespace) -> None:
     at_end = ("strain", "phi", "stress", "pressure", "sigma", "mu", "z")
     found = {name: float(run[name][-1]) for name in at_end}
     found |= {"not_at_rest": int((~run.at_rest).sum()), "modulus": run.modulus(), **_steady(run)}
+    if options.stress_step is not None:
+        found["yield_stress"] = run.yield_stress and run.yield_stress._asdict()
+    found |= {"per_cycle": run.cycles()} if run.steps_per_cycle else {}
     report({"out": options.out, **found, "events": run.events(options.least_drop)})
 
 

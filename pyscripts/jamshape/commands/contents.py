@@ -29,8 +29,10 @@ from jamshape.files.outcomes import is_reached, shortfall
 from jamshape.files.signature import DATA, DUMP, GSD, HDF5, REFUSED, RESTART, SIGNATURES, format_of
 from jamshape.front.frames import frames
 from jamshape.front.packing import Packing, public, results_of
-from jamshape.front.recorded import KINDS
+from jamshape.front.recorded import KINDS, run_file
+from jamshape.front.run import CyclicShearFile, QuasistaticShearFile
 from jamshape.packing import Packing as PackingLike
+from jamshape.protocols.ensemble import ENSEMBLE
 from jamshape.recording.driver import KIND
 from jamshape.vibration.ensembles import TOLD, count_of, of_packing
 from jamshape.vibration.table import ModeTable, holds_modes, read_modes
@@ -39,7 +41,8 @@ _OF_CONTACTS = ("pressure", "u", "z", "z_single")
 _STATE = ("phi", *_OF_CONTACTS, "rattlers")
 _MOST_CUBATIC = 2000  # particles whose cubatic order takes less than a second
 _MADE = ("seed", "kappa", "u0", "protocol", "phi_start", "phi_end", "gdot",
-         "amplitude", "period", "cycles", "flow", "strain_step", "strain_end", "hold_pressure", "outcome")  # fmt: skip
+         "amplitude", "period", "cycles", "flow", "strain_step", "strain_end", "hold_pressure",
+         "target_pressure", "target_phi", "box_yields", "tries", "outcome")  # fmt: skip
 
 
 _SAME_COMMAND = "repeat the command that began it"
@@ -106,6 +109,8 @@ def _particles(path: Path) -> dict[str, Any]:
         found["kappa"] = np.ravel(found["kappa"])[-1].item()
     if "outcome" in known:
         found |= {"reached": is_reached(known), "shortfall": shortfall(known) or None}
+    if is_run and "cycles" in known:
+        found |= _last_cycle(path)
     found |= {"frames": count_frames(path), **_cost(path, known)}
     found |= {"format_version": read_format_version(path), "jamshape_version": read_creator(path)}
     found |= {"origin": origin} if (origin := read_origin(path)) else {}
@@ -160,6 +165,14 @@ def _order(packing: Packing) -> dict[str, float]:
     return {name: value for name, value in found.items() if not math.isnan(value)}
 
 
+def _last_cycle(path: Path) -> dict[str, Any]:
+    """Describe the last whole cycle of a shear to and fro, if there is one."""
+    run = run_file(path)
+    if isinstance(run, CyclicShearFile | QuasistaticShearFile) and (last := run.cycles(first=-1)):
+        return {"last_cycle": last[0]._asdict()}
+    return {}
+
+
 def _cost(path: Path, known: Mapping[str, Any]) -> dict[str, Any]:
     """Return the error reached and the time taken."""
     report = read_report(path)
@@ -174,7 +187,9 @@ def _cost(path: Path, known: Mapping[str, Any]) -> dict[str, Any]:
 
 def _go_on(path: Path, known: Mapping[str, Any]) -> str:
     """Advise how to continue an unfinished run."""
-    kind = KINDS.get(str(known.get(KIND)))
+    kind = KINDS.get(name := str(known.get(KIND)))
+    if name == ENSEMBLE:
+        return f"js.resume({str(path)!r}) in Python"
     if kind and kind.plan_of is None:
         return _OTHER_COMMAND.format(result=_result_of(path))
     return _SAME_COMMAND

@@ -9,7 +9,8 @@ kinds of particles, with rattlers in grey (unless all are); the order of the nei
 grows and grey without contacts: nematic (S2), tetratic (S4, in the plane), cubatic (C4, in space); the orientation;
 or the packing (one). As in Fig. 7 of Marschall & Teitel, PRE 97, 012905, and Figs. 2, 4 b, c and 8 b of Yuan,
 VanderWerf, Shattuck & O'Hern, Soft Matter (2019). The last line of standard output is one JSON object with the
-counts. A name such as movie.gif or movie.mp4, which needs ffmpeg, makes a movie of all frames of one file.
+counts. A name such as movie.gif or movie.mp4, which needs ffmpeg, makes a movie of all frames of one file, or of
+one --mode of a file that `jamshape modes --vectors` has written.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from jamshape.drawing.pictures import draw_pictures, read_picture, save_pictures
 from jamshape.files.meaning import Wanted
 from jamshape.front.files import load
 from jamshape.front.frames import frames
+from jamshape.front.modes import Modes
 from jamshape.front.movies import animate
 from jamshape.packing import Packing
 from jamshape.shapes.command_line import add_meaning_options
@@ -47,6 +49,9 @@ def options_of() -> ArgumentParser:
     parser.add_argument("--frame", type=int, help="frame; negative counts from the end (-1)")
     parser.add_argument("--every", type=int, help="show every n-th frame in a movie (1)")
     parser.add_argument("--fps", type=float, help="frames per second of a movie (10)")
+    parser.add_argument("--mode", type=int, help="row of the mode that swings, in a file of modes")
+    swing = "largest displacement in a mode, over the smallest radius (0.5)"
+    parser.add_argument("--amplitude", type=float, help=swing)
     parser.add_argument(
         "--color",
         choices=(*CHOICES, *NAMED),
@@ -91,9 +96,11 @@ def _movie(options: Namespace) -> None:
     meaning = {"dimension": options.dimension, "shape": options.shape}
     found = load(path, **meaning)
     shown = frames(path, **meaning) if isinstance(found, Packing) else found
-    animate(
-        shown, options.out, color=color_of(options.color), **typed(options, "fps", "every", "dpi")
-    )
+    how = typed(options, "fps", "every", "dpi", "amplitude")
+    animate(shown, options.mode, options.out, color=color_of(options.color), **how)
+    if isinstance(shown, Modes):
+        report({"out": options.out, "mode": options.mode, "omega": shown.omega[options.mode]})
+        return
     report({"out": options.out, "frames": len(range(0, len(shown), options.every or 1))})
 
 
@@ -111,7 +118,7 @@ def main(options: Namespace) -> None:
     if options.out.suffix.lower() in MOVIES:
         _movie(options)
         return
-    _require_none(options, "every", "fps")
+    _require_none(options, "every", "fps", "mode", "amplitude")
     dpi = _PIXELS if options.dpi is None else options.dpi
     require_stated(dpi=dpi)
     for name, value in typed(options, "height", "turn").items():

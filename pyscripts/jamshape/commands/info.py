@@ -38,6 +38,10 @@ _LINES = {
         "seed {seed}",
         "kappa {kappa:g}",
         "u0 {u0:g}",
+        "pressure {target_pressure:g}",
+        "phi {target_phi:g}",
+        "box {box_yields}",
+        "{tries} tries to be stable to shear",
         "protocol {protocol}",
         "phi from {phi_start:g}",
         "to {phi_end:g}",
@@ -47,6 +51,14 @@ _LINES = {
         "steps of {strain_step:g}",
         "to strain {strain_end:g}",
         "at pressure {hold_pressure:g}",
+    ),
+    "last cycle": (
+        "number {last_cycle[number]}",
+        "work {last_cycle[work]:.4g}",
+        "lost {last_cycle[lost]:.4g}",
+        "storage modulus {last_cycle[storage]:.4g}",
+        "loss modulus {last_cycle[loss]:.4g}",
+        "{returned_text}",
     ),
     "modes": ("{modes} of {n_modes}", "{bands_text}", "by the method {method!r}"),
     "moduli": ("bulk {bulk_modulus:.6g}", "mean shear {B_G_dc:.6g}", "{stability_text}"),
@@ -101,10 +113,20 @@ def lines_of(found: Mapping[str, Any]) -> Iterator[str]:
         known["stability_text"] = (
             f"{'stable' if found['is_stable_to_shear'] else 'unstable'} to shear"
         )
+    if "last_cycle" in found:
+        known["returned_text"] = _returned(found["last_cycle"])
     for subject, parts in _LINES.items():
         said = [text for text in (_filled(part, known) for part in parts) if text]
         if said:
             yield f"{subject + ':':12} {', '.join(said)}"
+
+
+def _returned(cycle: Mapping[str, Any]) -> str:
+    """Describe whether particles return."""
+    if cycle["is_reversible"] is None:
+        return "without its states"
+    word = "reversible" if cycle["is_reversible"] else "not reversible"
+    return f"{word}: particles within {cycle['largest']:.2g} radii, {cycle['changed']} contacts changed"
 
 
 def _filled(part: str, known: Mapping[str, Any]) -> str:

@@ -1,10 +1,11 @@
-"""Take a packing of any shape through energies, each state from the one before, and list the contacts that change.
+"""Take a packing of any shape through energies or pressures, and list the contacts that change from state to state.
 
     jamshape ladder packing.h5 --u0 1e-6 1e-8 1e-10 --out ladder.h5
+    jamshape ladder packing.h5 --pressure 1e-3 1e-4 1e-5 --box free --out ladder.h5
 
-The packing is an H5MD file, whose last frame is taken; energies follow in the order given. The last line of standard
-output is one JSON object: for each energy its state, and the numbers of contacts that opened and closed on the way to
-it, which --within encloses closely. The exit code is 0 only if forces balance at each energy. The same command resumes
+The packing is an H5MD file, whose last frame is taken; values follow in the order given. The last line of standard
+output is one JSON object: for each value its state, and the numbers of contacts that opened and closed on the way to
+it, which --within encloses closely. The exit code is 0 only if forces balance at each value. The same command resumes
 an interrupted run and leaves a finished one alone; it refuses a file with other settings, unless --again replaces it.
 With --seconds it stops in time, before a queue ends it: the exit code is then 75.
 """
@@ -30,11 +31,15 @@ _STATE = ("u", "phi", "pressure", "z", "rattlers", "residual")
 def options_of() -> ArgumentParser:
     """Make the parser."""
     parser = parser_for(ladder, __doc__)
-    within = "list each change between two energies whose relative distance is at most this, by bisection"
+    within = (
+        "list each change between two values whose relative distance is at most this, by bisection"
+    )
     parser.add_argument("--within", type=float, help=within)
     back = "take the packing back over each change, to see if it returns"
     parser.add_argument("--step-back", action="store_true", help=back)
-    parser.add_argument("--plot", type=Path, help="figure of z and of the changes against u0")
+    parser.add_argument(
+        "--plot", type=Path, help="figure of z and of the changes against the values"
+    )
     return parser
 
 

@@ -17,30 +17,20 @@ from jamshape.checks import require_other_file
 from jamshape.command import report
 from jamshape.commands.signatures import called, parser_for
 from jamshape.front.minimising import minimise
-from jamshape.front.reading import packing_of
 from jamshape.protocols.make import summary_of
-from jamshape.shapes.command_line import add_meaning_options
 
 GO_ON = "the same command resumes from the file beside the result"
 
 
 def options_of() -> ArgumentParser:
     """Make the parser."""
-    parser = parser_for(minimise, __doc__)
-    parser.add_argument(
-        "--frame", type=int, default=-1, help="frame; negative counts from the end (-1)"
-    )
-    add_meaning_options(parser)
-    return parser
+    return parser_for(minimise, __doc__)
 
 
 def main(options: Namespace) -> int:
     """Minimise the state unless that is done; return the exit code."""
     require_other_file(options.out, [options.packing])
-    packing = packing_of(
-        options.packing, options.frame, dimension=options.dimension, shape=options.shape
-    )
-    called(minimise, options, packing=packing)
+    called(minimise, options)
     found = summary_of(options.out)
     report(found)
     return 0 if found["reached"] else 1  # a warning was issued

@@ -25,8 +25,6 @@ from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import packing_text
 from jamshape.files.ensembles import PackingFile
 from jamshape.front.modes import Modes, modes, require_modes_file
-from jamshape.front.reading import packing_of
-from jamshape.shapes.command_line import add_meaning_options
 from jamshape.vibration.ensembles import TOLD
 from jamshape.vibration.statistics import Redundancy, redundancies
 from jamshape.vibration.table import BANDS, MODULI, ModeTable
@@ -44,10 +42,6 @@ def options_of() -> ArgumentParser:
     parser.add_argument("--out", type=Path, default=out, help="HDF5 file to write (%(default)s)")
     parser.add_argument("--plot", type=Path, help="D(omega), participation and kinds of motion")
     parser.add_argument("--vectors", action="store_true", help="store eigenvectors")
-    parser.add_argument(
-        "--frame", type=int, default=-1, help="frame; negative counts from the end (-1)"
-    )
-    add_meaning_options(parser)
     return parser
 
 
@@ -158,10 +152,7 @@ def main(options: Namespace) -> None:
     require_modes_file(options.out, [options.packing])
     if options.plot:
         require_other_file(options.plot, [options.packing, options.out])
-    meaning = {"dimension": options.dimension, "shape": options.shape}
-    found: Modes = called(
-        modes, options, packing=packing_of(options.packing, options.frame, **meaning)
-    )
+    found: Modes = called(modes, options)
     table, packing, matrix = found.table, found.packing, found.matrix
     assert packing is not None
     assert matrix is not None

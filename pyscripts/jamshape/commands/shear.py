@@ -2,8 +2,8 @@
 
     jamshape shear --alpha 4 --n 256 --phi 0.8 --gdot 1e-4 --strain 5 --out shear.h5
 
-Starts from a random packing compressed fast to --phi, or from the last frame of a run or packing file
-(--start). The last line of standard output is one JSON object with averages over the steady state, each with its
+Starts from a random packing compressed fast to --phi, or from the last frame of a file with particles
+(--start), or that of --frame. The last line of standard output is one JSON object with averages over the steady state, each with its
 error and its correlation strain (memory); they exclude the start-up, which the file
 includes. --after sets the strain at which averaging begins. The same command resumes an interrupted run and reports
 a finished one; it refuses a file with other settings, unless --again replaces it. With --seconds it stops in time,

@@ -2,7 +2,8 @@
 
 An argument becomes the option of its name, or a position if it has no default, with the type of its annotation, the
 default of the signature, and the choices and the text of the docstring. A pair such as ``phi`` becomes ``--phi-start`` and ``--phi-end``, with the parts
-of its text before and after ", and "; ``particles`` becomes the options of particles, and ``file`` becomes ``--out``.
+of its text before and after ", and "; ``particles`` becomes the options of particles, and ``file`` becomes ``--out``. With an
+argument that `front.reading.packing_of` reads come ``--frame``, ``--dimension`` and ``--shape``, as of `load`.
 """
 
 from __future__ import annotations
@@ -18,10 +19,18 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from jamshape.checks import TIME_IS_UP
-from jamshape.command import parser_of
+from jamshape.checks import TIME_IS_UP, require_with
+from jamshape.command import parser_of, typed
+from jamshape.front.reading import packing_of
 from jamshape.old_names import VALUES, add_old_option, current
-from jamshape.shapes.command_line import add_particle_options, particles_beside, particles_of
+from jamshape.packing import Packing
+from jamshape.shapes.command_line import (
+    add_meaning_options,
+    add_particle_options,
+    are_particles_given,
+    particles_beside,
+    particles_of,
+)
 
 _STOP = f"stop at the first checkpoint after this time [s], with exit code {TIME_IS_UP}; the same command resumes"
 
@@ -64,6 +73,12 @@ def parser_for(function: Callable[..., Any], doc: str | None) -> ArgumentParser:
         if name in old:
             keywords = {key: options[0].keywords[key] for key in ("type", "choices")}
             add_old_option(parser, _flag(old[name]), _flag(name), **keywords)
+    if _held(function) is not None:
+        parser.add_argument(
+            "--frame", type=int, help="frame of that file; negative counts from the end (-1)"
+        )
+        if missing := _meaning_only(function):
+            add_meaning_options(parser, *missing)
     return parser
 
 
@@ -82,11 +97,43 @@ def given(function: Callable[..., Any], options: Namespace) -> dict[str, Any]:
 def called(function: Callable[..., Any], options: Namespace, **more: Any) -> Any:
     """Call a function with the particles and arguments that were typed, and more."""
     arguments = given(function, options) | more
+    options = _with_packing(function, options, arguments)
     known = inspect.signature(function).parameters.get(_PARTICLES)
     if known is not None:
         read = particles_of if known.default is known.empty else particles_beside
         arguments[_PARTICLES] = read(options)
     return function(**arguments)
+
+
+def _held(function: Callable[..., Any]) -> str | None:
+    """Name the argument that is a packing, or a file of one."""
+    parameters = inspect.signature(function, eval_str=True).parameters
+    return next((n for n, one in parameters.items() if Packing in _kinds(one.annotation)), None)
+
+
+def _meaning_only(function: Callable[..., Any]) -> list[str]:
+    """List the options of `add_meaning_options` that mean nothing else to a command."""
+    own, others = inspect.signature(function).parameters, {"shape": _PARTICLES}
+    return [name for name in ("dimension", "shape") if others.get(name, name) not in own]
+
+
+def _with_packing(
+    function: Callable[..., Any], options: Namespace, arguments: dict[str, Any]
+) -> Namespace:
+    """Read the packing of a frame or a meaning that was typed into the arguments; return the options left."""
+    name = _held(function)
+    if name is None:
+        return options
+    path = arguments.get(name)
+    require_with(name, path, **typed(options, "frame", *_meaning_only(function)))
+    meaning = typed(options, "frame", "dimension", "shape")
+    others = Namespace(**vars(options) | {"shape": None})
+    is_mixed = "shape" not in _meaning_only(function) and are_particles_given(others)
+    if path is None or not meaning or is_mixed:
+        return options
+    arguments.pop("dimension", None)
+    arguments[name] = packing_of(path, **meaning)
+    return others
 
 
 def _options(function: Callable[..., Any]) -> dict[str, list[_Option]]:

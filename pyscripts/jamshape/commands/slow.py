@@ -1,9 +1,9 @@
-"""Compress particles of any shape in the plane through jamming at any rate, however slow; record p(phi).
+"""Compress particles of any shape through jamming at any rate, however slow; record p(phi).
 
     jamshape slow --alpha 4 --n 256 --kappa 1e-9 --phi-end 0.88 --out slow.h5
 
-Starts from the last frame of a run or packing file (--start), or compresses a random packing fast in
-LAMMPS first. At the end frames are minimised, since p(phi) of a flow rises, too: its onset phi_J(kappa) is that of
+Starts from the last frame of a file with particles (--start), or that of --frame, or compresses a random packing fast
+in LAMMPS first. At the end frames are minimised, since p(phi) of a flow rises, too: its onset phi_J(kappa) is that of
 jamming only if states there stay jammed without driving; --no-minimising skips this. The same command resumes an
 interrupted run and leaves a finished one alone; it refuses a file with other settings, unless --again replaces it.
 With --seconds it stops in time, before a queue ends it: the exit code is then 75. The last line of standard output is

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from jamshape.drawing.text import ensemble_text, pressure_unit, systems_text
+from jamshape.measures.cycles import moduli_of
 from jamshape.measures.events import stress_drops
 
 if TYPE_CHECKING:
@@ -56,7 +57,12 @@ def draw_cycles(axes: Axes, run: Cycles, system: System) -> None:
         part = slice((cycle - 1) * run.rows, cycle * run.rows + 1)
         axes.plot(run.strain[part], run.stress[part], color=color, lw=1, label=f"cycle {cycle}")
     axes.set(xlabel=r"strain $\gamma$", ylabel=rf"shear stress  ${pressure_unit([system])}$")
-    axes.set_title(f"{systems_text([system])}, cyclic shear", size=9)
+    axes.locator_params(axis="x", nbins=5)  # small strains have long numbers
+    title = f"{systems_text([system])}, cyclic shear"
+    if len(run.strain) > run.rows:
+        storage, loss = moduli_of(run.strain[part], run.stress[part])
+        title += f"\ncycle {last}: $G'={storage:.3g}$, $G''={loss:.3g}$"
+    axes.set_title(title, size=9)
     axes.legend(fontsize=8)
 
 

@@ -40,7 +40,7 @@ def is_reached(known: Mapping[str, Any]) -> bool:
     >>> is_reached({"outcome": "sliding", "residual": 2e-7, "tolerance": 1e-8})
     False
     """
-    return _is_balanced(known) and not _n_negative(known)
+    return _is_balanced(known) and not _n_negative(known) and not _is_unstable(known)
 
 
 def shortfall(known: Mapping[str, Any]) -> str:
@@ -58,6 +58,9 @@ def shortfall(known: Mapping[str, Any]) -> str:
         return f"it ended {known['outcome']}{again}, {found}{most}"
     if n := _n_negative(known):
         return f"{n} of its modes have a negative eigenvalue, expected none"
+    if _is_unstable(known):
+        value, bound = (known[f"bordered_eigenvalue{end}"] for end in ("", "_bound"))
+        return f"after {known['tries']} tries the smallest eigenvalue of its bordered Hessian is {value:.2g} +- {bound:.1g}, expected none below 0"
     return ""
 
 
@@ -93,6 +96,12 @@ def _is_balanced(known: Mapping[str, Any]) -> bool:
 
 def _n_negative(known: Mapping[str, Any]) -> int:
     return int(known.get("n_negative", 0)) if known.get("strict") else 0
+
+
+def _is_unstable(known: Mapping[str, Any]) -> bool:
+    """Return whether a packing that was to be stable to shear is not."""
+    bound = float(known.get("bordered_eigenvalue_bound", 0.0))
+    return bool(known.get("stable_to_shear")) and float(known["bordered_eigenvalue"]) < -bound
 
 
 def _residual(known: Mapping[str, Any]) -> float:

@@ -1,7 +1,7 @@
 """Flow of the host medium: deformation of the box, and rotation of torque-free particles.
 
 The host moves as u(r) = G r with a constant velocity gradient G, an upper triangular matrix, so that in a time t it
-deforms by exp(G t). In two dimensions.
+deforms by exp(G t).
 """
 
 from __future__ import annotations
@@ -12,31 +12,32 @@ from typing import Any
 import numpy as np
 
 from jamshape.arrays import FloatArray, LongArray
+from jamshape.packing import rate_of_vector, turned
 
 
 @dataclass(frozen=True, eq=False)
 class Host:
-    """A host in the plane.
+    """A host in the plane or in space.
 
     Parameters
     ----------
-    gradient : (2, 2) array of float64, [1/time]
-        du_k/dr_l, upper triangular.
+    gradient : (D, D) array of float64, [1/time]
+        du_k/dr_l, upper triangular; in space without shear along z.
     """
 
     gradient: FloatArray
 
     @classmethod
-    def compressing(cls, kappa: float) -> Host:
+    def compressing(cls, kappa: float, dimension: int = 2) -> Host:
         """Shrink all lengths at a rate."""
-        return cls(-kappa * np.eye(2))
+        return cls(-kappa * np.eye(dimension))
 
     @classmethod
-    def shearing(cls, gdot: float, flow: str) -> Host:
-        """Shear at a rate; `flow` is one of `jamshape.flow.shear.FLOWS`."""
-        if flow == "simple":
-            return cls(np.array([[0.0, gdot], [0.0, 0.0]]))
-        return cls(np.diag([gdot, -gdot]))
+    def shearing(cls, gdot: float, flow: str, dimension: int = 2) -> Host:
+        """Shear in the plane of x and y at a rate; `flow` is one of `jamshape.flow.shear.FLOWS`."""
+        gradient = np.zeros((dimension, dimension))
+        gradient[:2, :2] = [[0.0, gdot], [0.0, 0.0]] if flow == "simple" else np.diag([gdot, -gdot])
+        return cls(gradient)
 
     @property
     def rate(self) -> float:
@@ -44,32 +45,39 @@ class Host:
         return float(np.abs(self.gradient).max())
 
     def deformation(self, time: float) -> LongArray:
-        """(2, 2) exp(G t)."""
-        a, d = (np.longdouble(self.gradient[k, k]) * time for k in (0, 1))
-        mean, half = (a + d) / 2, (a - d) / 2
+        """(D, D) exp(G t)."""
+        rates = np.diagonal(self.gradient).astype(np.longdouble) * time
+        found: LongArray = np.diag(np.exp(rates))
+        mean, half = (rates[0] + rates[1]) / 2, (rates[0] - rates[1]) / 2
         # (exp(a) - exp(d)) / (a - d), with limit exp(a).
         slope = np.exp(mean) * (np.sinh(half) / half if half else np.longdouble(1))
-        corner = np.longdouble(self.gradient[0, 1]) * time * slope
-        return np.array([[np.exp(a), corner], [np.longdouble(0), np.exp(d)]])
+        found[0, 1] = np.longdouble(self.gradient[0, 1]) * time * slope
+        return found
 
     @property
     def turns_particles(self) -> bool:
         """Whether it rotates particles; isotropic compression does not."""
-        (a, b), (_, d) = self.gradient
-        return bool(a != d or b != 0.0)
+        return bool((self.gradient != self.gradient[0, 0] * np.eye(len(self.gradient))).any())
 
-    def spin(self, bodies: Any, angle: FloatArray) -> FloatArray:
-        """(N,) angular velocities of particles without torque, at (N,) angles, [1/time]."""
-        found: FloatArray = bodies.host_spin(np.ascontiguousarray(angle[:, None]), self.gradient)
-        return found[:, 0]
+    def spin(self, bodies: Any, orientation: FloatArray) -> FloatArray:
+        """(N, 1 or 3) angular velocities of particles without torque, at (N, 1) angles or (N, 4) quaternions, [1/time]."""
+        found: FloatArray = bodies.host_spin(np.ascontiguousarray(orientation), self.gradient)
+        return found
 
-    def turns(self, bodies: Any, angle: FloatArray, time: float) -> FloatArray:
-        """(N,) rotations of torque-free particles in a time in which the host deforms little.
+    def turns(self, bodies: Any, orientation: FloatArray, time: float) -> FloatArray:
+        """(N, 1 or 3) rotations of torque-free particles in a time in which the host deforms little.
 
-        One step of the fourth-order Runge-Kutta method, with an error of fifth order in the strain.
+        One step of the fourth-order Runge-Kutta method, with an error of fifth order in the strain; in space for
+        rotation vectors (Munthe-Kaas 1998, BIT 38, 92).
         """
-        k1 = self.spin(bodies, angle)
-        k2 = self.spin(bodies, angle + 0.5 * time * k1)
-        k3 = self.spin(bodies, angle + 0.5 * time * k2)
-        k4 = self.spin(bodies, angle + time * k3)
+
+        def rate(turn: FloatArray) -> FloatArray:
+            if turn.shape[1] == 1:
+                return self.spin(bodies, orientation + turn)
+            return rate_of_vector(turn, self.spin(bodies, turned(orientation, turn)))
+
+        k1 = self.spin(bodies, orientation)
+        k2 = rate(0.5 * time * k1)
+        k3 = rate(0.5 * time * k2)
+        k4 = rate(time * k3)
         return time * (k1 + 2 * k2 + 2 * k3 + k4) / 6

@@ -5,7 +5,7 @@ affine part is exact, and the remainder is mobility times force: a gradient flow
 Each stage of a step begins where the host alone would take particles, box and angles in its time. Explicit
 methods must resolve the relaxation of a contact at any rate; here the step follows the path of the
 packing, and its cost hardly depends on the rate. When a packing rearranges, the step falls to the
-relaxation time and grows again. In two dimensions; needs no LAMMPS.
+relaxation time and grows again. Needs no LAMMPS.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import numpy as np
 from jamshape.arrays import FloatArray, IntArray, LongArray
 from jamshape.checks import require_one_of, require_positive
 from jamshape.flow.host import Host
+from jamshape.flow.turning import turning_of
 from jamshape.landscape import CrossingError, Evaluation, Landscape, State
 from jamshape.landscape.local_energy_model import LocalEnergyModel, Stage, StageFactors, Units
 
@@ -56,10 +57,6 @@ _AT_ONCE = 1e-9
 
 # Extended precision is used if the rounding of doubles exceeds this fraction of the accuracy of a stage.
 _ROUNDING = 0.1
-
-
-_AT_REST = np.stack([np.eye(2), np.zeros((2, 2))])
-"""Identity: a host that has not moved."""
 
 
 class Method(NamedTuple):
@@ -167,9 +164,9 @@ class Protocol:
 
     def leg(self, flow: Flow, phi: float) -> Leg:
         """Return the host at a packing fraction, and for how long it applies."""
-        del flow
+        dimension = flow.state.dimension
         kappa, end = self._rate_at(phi)
-        return Leg(Host.compressing(kappa), 0.5 * math.log(end / phi) / kappa)
+        return Leg(Host.compressing(kappa, dimension), math.log(end / phi) / dimension / kappa)
 
     def is_over(self, flow: Flow, phi: float) -> bool:
         """Whether the end is reached."""
@@ -219,7 +216,7 @@ class Flow:
     strain: float = 0.0
     """Strain of the box since the start: -ln L / L_0 of compression."""
     turned: float = 0.0
-    """Mean rotation angle of particles since the start."""
+    """Mean rotation angle of particles since the start, in space about z."""
     steps: int = 0
     rejected: int = 0
     explicit: int = 0
@@ -267,7 +264,6 @@ def compress(landscape: Landscape, flow: Flow, protocol: Protocol) -> Iterator[S
     Parameters
     ----------
     landscape : Landscape
-        Landscape of particles in two dimensions.
     flow : Flow
         Initial or resumed state; updated.
     protocol : Protocol
@@ -279,8 +275,6 @@ def compress(landscape: Landscape, flow: Flow, protocol: Protocol) -> Iterator[S
 
     Raises
     ------
-    ValueError
-        If the particles are not in two dimensions.
     CrossingError
         If spines cross at the start, or at a rate that exceeds the strength of contacts.
     """
@@ -342,21 +336,19 @@ class Course(Proto):
 def drag_coefficients(landscape: Landscape, k_d: float = 1.0) -> FloatArray:
     """(n,) drag coefficients: k_d Area, and k_d Area I / A^2 for rotations, scaled to lengths A theta.
 
-    Marschall & Teitel 2018, Eqs. 11 and 12.
-
-    Raises
-    ------
-    ValueError
-        If the particles are not in two dimensions.
+    Marschall & Teitel 2018, Eqs. 11 and 12; in space about the body's axes, with the volume.
     """
-    packing = landscape.particles
-    if packing.dimension != 2:
-        msg = f"the packing has {packing.dimension} dimensions, expected 2"
-        raise ValueError(msg)
+    return k_d * landscape.coordinates(_drag(landscape))
+
+
+def _drag(landscape: Landscape) -> FloatArray:
+    """(N, D + rotations) drag coefficients over k_d."""
     measure, moment = landscape.bodies.measure, landscape.bodies.moment
+    D = landscape.particles.dimension
     length = np.where(landscape.rotation_length > 0, landscape.rotation_length, 1.0)
-    turning = measure * moment[:, 2] / length**2
-    return k_d * landscape.coordinates(np.column_stack([measure, measure, turning]))
+    about = moment[:, 2:] if D == 2 else moment
+    turning = measure[:, None] * about / length[:, None] ** 2
+    return np.column_stack([*[measure] * D, turning])
 
 
 class _Trial(NamedTuple):
@@ -382,22 +374,22 @@ class ImplicitFlow:
 
     def __init__(self, landscape: Landscape, flow: Flow, protocol: Course) -> None:
         self.landscape, self.flow, self.protocol = landscape, flow, protocol
-        self.local_model = LocalEnergyModel(landscape, flow.state)
+        self.local_model = LocalEnergyModel(landscape, flow.state, along_bodies=True)
         self.still = np.zeros(landscape.size)
         self.drag = drag_coefficients(landscape, protocol.k_d)
-        self._least_drag = float(self.drag.min())
-        self.area = float(landscape.particles.measures.sum())
+        self._least_drag = _least_drag(landscape, protocol.k_d)
+        self.measure = float(landscape.particles.measures.sum())
         self.size = 2 * float(landscape.inner_radius.mean())
-        self.host = Host(np.zeros((2, 2)))
-        self.columns = tuple(_as_slice(landscape.column[:, k]) for k in (0, 1))
-        self.no_turns = np.zeros(landscape.particles.n)
-        self.angle = self.no_turns
+        self.dimension = landscape.particles.dimension
+        self.host = Host(np.zeros((self.dimension, self.dimension)))
+        self.columns = [_as_slice(landscape.column[:, k]) for k in range(self.dimension)]
+        self.orientation = flow.state.orientation.astype(np.float64)
         self._crossing: CrossingError | None = None
 
     @property
     def phi(self) -> float:
         """Packing fraction."""
-        return self.area / self.flow.state.volume
+        return self.measure / self.flow.state.volume
 
     def advance(self) -> Step:
         """Take a step and count it."""
@@ -408,7 +400,7 @@ class ImplicitFlow:
         flow.evaluations += landscape.evaluations - evaluations
         flow.steps += 1
         volume = flow.state.volume
-        pressure = -found.strain_gradient / (2 * volume)
+        pressure = -found.strain_gradient / (self.dimension * volume)
         return Step(
             flow.steps, flow.time, flow.strain, self.phi, pressure, found.energy / volume, dt, error,
             flow.evaluations, flow.factorisations, flow.rejected, flow.explicit, flow.wall_seconds,
@@ -423,7 +415,7 @@ class ImplicitFlow:
             self.local_model.forget_pairs()
             flow._is_fresh = False
         self.local_model.hold()
-        self.angle = flow.state.orientation[:, 0].astype(np.float64)
+        self.orientation = flow.state.orientation.astype(np.float64)
         self.host, longest = self.protocol.leg(flow, self.phi)
         # Stage accuracy suffices for units and energies.
         here = flow._here or self._evaluated()
@@ -501,7 +493,9 @@ class ImplicitFlow:
 
     def _evaluated(self) -> Evaluation:
         """Evaluate the present state."""
-        self.local_model.deform(_AT_REST, self.no_turns[:, None])
+        at_rest = np.stack([np.eye(self.dimension), np.zeros((self.dimension, self.dimension))])
+        n_turns = 1 if self.dimension == 2 else 3
+        self.local_model.deform(at_rest, np.zeros((self.landscape.particles.n, n_turns)))
         return self.local_model.evaluate(self.still, 0.0, extended=False)
 
     def _refuse_crossing(self, dt: float) -> None:
@@ -585,9 +579,10 @@ class ImplicitFlow:
                 path.add(flow.velocity)
                 continue
             drag = self.drag / own
-            guess = centre + own * self._predicted(path)
+            predicted = self._predicted(path)
+            guess = centre + own * predicted
             path.go_to_stage()
-            pushed = centre + own * path.excess_spin(guess)
+            pushed = centre + own * path.turning.excess(guess, predicted)
             stage = Stage(drag, pushed, (guess, last), self._is_extended(unit))
             found = self.local_model.solve(stage, flow._factors, units, accuracy)
             flow.factorisations += found.factorisations
@@ -623,7 +618,8 @@ class ImplicitFlow:
             x = path.combined(row, dt)
             path.go_to_stage()
             evaluation = self.local_model.evaluate(x, 0.0, extended=extended)
-            path.add(-evaluation.gradient / self.drag + path.excess_spin(x))
+            velocity = -evaluation.gradient / self.drag
+            path.add(velocity + path.turning.excess(x, velocity))
         error = 0.5 * dt * (path.velocity(1) - path.velocity(0))
         return _Attempt(x, path, self._rms(error) / self._unit(evaluation), evaluation)
 
@@ -637,13 +633,20 @@ class ImplicitFlow:
         missed = np.linalg.norm(jump - dt * acceleration)
         flow.extrapolates = int(missed < _TOLD * np.linalg.norm(jump))
         flow.acceleration = jump / dt
-        flow.velocity = path.velocities[-1]
+        flow.velocity = path.turning.settled(attempt.x, path.velocities[-1])
         flow.time += dt
-        flow.turned += path.mean_turn(attempt.x)
+        flow.turned += path.turning.mean(attempt.x)
         flow.strain += self.host.rate * dt
         cell = flow.state.cell
         if abs(cell[0, 1]) > _LARGEST_TILT * cell[0, 0]:  # pair shifts refer to other cell vectors
             flow._is_fresh = True
+
+
+def _least_drag(landscape: Landscape, k_d: float) -> float:
+    """Return the least drag coefficient, in space without axes about which a body hardly extends."""
+    drag, D = _drag(landscape), landscape.particles.dimension
+    turning = drag[landscape.rotation_length > 0, D:].max(axis=1)
+    return k_d * float(min(drag[:, 0].min(), turning.min(initial=np.inf)))
 
 
 def _as_slice(numbers: IntArray) -> slice | IntArray:
@@ -663,7 +666,7 @@ class _Path:
     def __init__(self, run: ImplicitFlow, times: list[float]) -> None:
         self.run, self.times = run, times
         self.velocities: list[FloatArray] = []
-        self._turned = run.no_turns
+        self.turning = turning_of(run.landscape, run.host, run.orientation)
         self._deformations: dict[float, LongArray] = {}
 
     @property
@@ -684,11 +687,13 @@ class _Path:
         after = self.next_time - begun
         if after == 0.0:
             return vector
-        (xx, xy), (_, yy) = self._deformation(after).astype(np.float64)
-        x, y = self.run.columns
+        matrix, columns = self._deformation(after).astype(np.float64), self.run.columns
         found = vector.copy()
-        found[x] = xx * vector[x] + xy * vector[y]
-        found[y] = yy * vector[y]
+        for k, column in enumerate(columns):
+            found[column] = matrix[k, k] * vector[column]
+            for m in range(k + 1, len(columns)):
+                if matrix[k, m]:
+                    found[column] += matrix[k, m] * vector[columns[m]]
         return found
 
     def _deformation(self, after: float) -> LongArray:
@@ -704,31 +709,8 @@ class _Path:
 
     def go_to_stage(self) -> None:
         """Move box, positions and angles with the host to the next stage."""
-        run, after = self.run, self.next_time
+        after = self.next_time
         matrix = self._deformation(after)
         double = matrix.astype(np.float64)
-        turns = run.no_turns
-        if run.host.turns_particles:
-            angle = run.angle
-            turns = run.host.turns(run.landscape.bodies, angle, after)
-            self._turned = angle + turns
         rest = (matrix - double).astype(np.float64)
-        run.local_model.deform(np.stack([double, rest]), turns[:, None])
-
-    def mean_turn(self, x: FloatArray) -> float:
-        """Average the rotation of particles by host and forces up to the end."""
-        forces = self.run.landscape.motion(x)[1][:, 0]
-        host = self._turned - self.run.angle if self.run.host.turns_particles else self._turned
-        return float((host + forces).mean())
-
-    def excess_spin(self, x: FloatArray) -> FloatArray:
-        """(n,) host rotation of particles that forces have rotated by x, in excess of that of others."""
-        run, landscape = self.run, self.run.landscape
-        if not run.host.turns_particles:
-            return run.still
-        turned = landscape.motion(x)[1][:, 0]
-        spin = run.host.spin(landscape.bodies, self._turned + turned)
-        spin -= run.host.spin(landscape.bodies, self._turned)
-        components = np.zeros((len(spin), 3))
-        components[:, 2] = spin * landscape.rotation_length
-        return landscape.coordinates(components)
+        self.run.local_model.deform(np.stack([double, rest]), self.turning.by_host(after))

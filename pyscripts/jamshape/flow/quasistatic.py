@@ -2,7 +2,8 @@
 
 The limit of shear at vanishing rate: between two rearrangements a packing stays in one minimum that
 moves with the box, and where that minimum vanishes the packing falls to another one. Maloney & Lemaitre, Phys. Rev. E
-74, 016118 (2006). At constant volume, or at constant pressure, where the box is also strained isotropically.
+74, 016118 (2006). At constant volume, or at constant pressure or normal stress, where the box also yields; by steps of
+the strain, or of the shear stress.
 Independent of shape and dimension; needs no LAMMPS.
 """
 
@@ -11,13 +12,13 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from jamshape.arrays import FloatArray, LongArray
-from jamshape.checks import RANGES, require_in, require_one_of, require_positive
+from jamshape.checks import RANGES, ArgumentError, require_in, require_one_of, require_positive
 from jamshape.contacts import Contacts
 from jamshape.flow.cyclic_shear import QUARTERS
 from jamshape.flow.host import Host
@@ -26,24 +27,12 @@ from jamshape.landscape import Landscape, State
 from jamshape.measures.order import OrientationalOrder, planar_order
 from jamshape.measures.stress import ShearStress
 from jamshape.minima import Minimum, Stop, minimise
-from jamshape.minima.target import followed
+from jamshape.minima.boxes import ISOTROPIC, SHEAR, FlowError, Settling, Yielding
+from jamshape.minima.boxes import advance as settle
 from jamshape.packing import Packing
 
-_ACCURACY = 1e-6  # relative, of the pressure
-_MOST_MINIMA = 60  # to reach it
-
-_LARGEST_STRAIN = 2e-3  # of the box, isotropic
-_FIRST_STRAIN = 1e-5  # without pressure; doubled each time
-
-# Fraction of the target pressure below which a packing is unjammed.
-_UNJAMMED = 0.01
-
-# Strain to measure the stiffness.
-_TRIED = 1e-8
-
-
-class PressureError(RuntimeError):
-    """The pressure could not be held; the message gives its value."""
+_ACCURACY = 1e-6  # of stresses, over the pressure
+_PART_OF_STEP = 1e-3  # largest error of a shear stress over its steps
 
 
 @dataclass(frozen=True)
@@ -60,6 +49,10 @@ class QuasistaticShear:
         One of `jamshape.flow.shear.FLOWS`; pure shear by gamma stretches x by exp(gamma).
     hold_pressure
         Pressure to hold, [energy / length^D]; the volume is held by default or if it is 0.
+    box
+        How the box yields to it: ``isotropic``, or the components of normal stresses to hold, such as ``yy``.
+    stress_step
+        Increase of the shear stress in each step, instead of the strain's; up to the strain, where the packing flows.
     tolerance
         Largest net force and torque of a particle over the mean bond force.
     amplitude, cycles
@@ -80,6 +73,8 @@ class QuasistaticShear:
     tolerance: float = 1e-8
     amplitude: float = 0.0
     cycles: int = 0
+    box: str = ISOTROPIC
+    stress_step: float = 0.0
 
     def __post_init__(self) -> None:
         largest = self.amplitude if self.cycles else abs(self.strain_end)
@@ -92,10 +87,30 @@ class QuasistaticShear:
         require_one_of("flow", self.flow, FLOWS)
         if self.flow == "pure":
             require_in("amplitude" if self.cycles else "strain", largest, RANGES["pure_strain"])
-        if self.strain_step > largest:
+        self._require_box()
+        if self.stress_step:
+            require_positive(stress_step=self.stress_step, strain_end=self.strain_end)
+            if self.cycles or self.flow != "simple":
+                said = "{stress_step} raises the stress of simple shear, expected no {cycles:name} and no other {flow:name}"
+                raise ArgumentError(
+                    said, {"stress_step": self.stress_step, "cycles": None, "flow": None}
+                )
+        elif self.strain_step > largest:
             what = "amplitude" if self.cycles else "final strain"
             msg = f"the step is {self.strain_step:g}, expected at most the {what}, {largest:g}"
             raise ValueError(msg)
+
+    def _require_box(self) -> None:
+        """Refuse a box that has no effect, or yields where it is sheared."""
+        if self.box == ISOTROPIC:
+            return
+        if not self.hold_pressure:
+            said = "{box} has no effect without {pressure:name}, expected both or neither"
+            raise ArgumentError(said, {"box": self.box, "pressure": None})
+        free = ("yy", "xx", "zz") if self.flow == "simple" else ("zz",)
+        if not set(self.box.split()) <= set(free):
+            said = f"{{box}} yields where the shear holds it, expected isotropic or of {' '.join(free)}"
+            raise ArgumentError(said, {"box": self.box})
 
     @classmethod
     def of(cls, stored: Mapping[str, Any]) -> QuasistaticShear:
@@ -107,6 +122,8 @@ class QuasistaticShear:
     def settings(self) -> dict[str, Any]:
         """Settings as attributes: those of one strain, or of cycles."""
         without = {"strain_end"} if self.cycles else {"amplitude", "cycles"}
+        without |= {"box"} if self.box == ISOTROPIC else set()
+        without |= {"strain_step"} if self.stress_step else {"stress_step"}
         return {name: value for name, value in asdict(self).items() if name not in without}
 
     @property
@@ -115,6 +132,12 @@ class QuasistaticShear:
         if self.cycles:
             return QUARTERS * self.quarter * self.cycles
         return math.ceil(abs(self.strain_end) / self.strain_step - 1e-9)
+
+    def is_over(self, run: Sheared) -> bool:
+        """Whether the end of the strain is reached."""
+        if self.stress_step:
+            return run.flows or run.strain >= self.strain_end
+        return run.steps >= self.steps
 
     @property
     def quarter(self) -> int:
@@ -141,10 +164,57 @@ class QuasistaticShear:
         """Return the derivative of the energy by strain over the volume, from a pressure tensor (D, D)."""
         return -float((pressure[:2, :2] * self._host.gradient).sum())
 
+    def goal(self) -> Yielding | None:
+        """Return the normal stress to hold; None if none is held."""
+        if not self.hold_pressure:
+            return None
+        return Yielding(self.box, self.hold_pressure, accuracy=_ACCURACY, tolerance=self.tolerance)
+
+    def next_stress(self, run: Sheared) -> Yielding:
+        """Return the stresses to reach in the next step."""
+        box = f"{self._normal(run.state.dimension)} {SHEAR}".strip()
+        part = _PART_OF_STEP * self.stress_step / max(run.pressure, self.stress_step)
+        left = max(self.strain_end - run.strain, self.strain_step)
+        return Yielding(
+            box, self.hold_pressure or None, accuracy=min(_ACCURACY, part), tolerance=self.tolerance,
+            shear=(run.steps + 1) * self.stress_step, most_strain=left,
+        )  # fmt: skip
+
+    def _normal(self, dimension: int) -> str:
+        """Return the components whose normal stresses are held by themselves."""
+        if not self.hold_pressure:
+            return ""
+        return "xx yy zz"[: 3 * dimension - 1] if self.box == ISOTROPIC else self.box
+
+    def work(self, before: _Normal, after: _Normal) -> float:
+        """Return the work of normal stresses that are held in components."""
+        if not self.stress_step and self.box == ISOTROPIC:
+            return 0.5 * (before.pressure + after.pressure) * (before.volume - after.volume)
+        axes = ["xyz".index(word[0]) for word in self._normal(len(after.edges)).split()]
+        mean = 0.5 * (
+            before.volume * np.diagonal(before.tensor) + after.volume * np.diagonal(after.tensor)
+        )
+        return float(-(mean * np.log(after.edges / before.edges))[axes].sum())
+
     @property
     def _host(self) -> Host:
         """Host with shear strain 1 in the time 1."""
         return Host.shearing(1.0, self.flow)
+
+
+class _Normal(NamedTuple):
+    """What the work of normal stresses depends on."""
+
+    pressure: float
+    volume: float
+    tensor: FloatArray
+    edges: FloatArray
+
+    @classmethod
+    def of(cls, landscape: Landscape, state: State, pressure: float) -> _Normal:
+        return cls(
+            pressure, state.volume, landscape.stress(state), np.asarray(state.edges, np.float64)
+        )
 
 
 class Row(NamedTuple):
@@ -187,6 +257,10 @@ class Sheared:
         Energy, resisting stress and pressure, [energy / length^D].
     volume
         Volume of the box.
+    strain
+        Shear strain since the start.
+    flows
+        Whether the packing did not resist the last shear stress.
     """
 
     state: State
@@ -195,6 +269,8 @@ class Sheared:
     stress: float = 0.0
     pressure: float = 0.0
     volume: float = 0.0
+    strain: float = 0.0
+    flows: bool = False
     evaluations: int = 0
     wall_seconds: float = 0.0
 
@@ -216,24 +292,31 @@ def shear(landscape: Landscape, run: Sheared, how: QuasistaticShear) -> Iterator
 
     Raises
     ------
-    PressureError
-        If no packing has the pressure to hold.
+    TargetError
+        If no packing has the stress to hold.
     CrossingError
         If spines cross in a step, which is then too long.
     """
-    while run.steps < how.steps:
+    while not how.is_over(run):
         yield advance(landscape, run, how)
 
 
 def advance(landscape: Landscape, run: Sheared, how: QuasistaticShear) -> Row:
     """Minimise the start, or shear by one step and minimise; parameters and errors as `shear`."""
     began, evaluations = time.perf_counter(), landscape.evaluations
-    done = run.steps
-    strain = 0.0 if done < 0 else how.strain_at(done + 1) - how.strain_at(done)
-    found = sheared(landscape, run.state, how, strain)
+    done, state = run.steps, run.state
+    holds = bool(how.hold_pressure) and done >= 0
+    before = _Normal.of(landscape, state, run.pressure) if holds else None
+    if how.stress_step:
+        found, strain = _stressed(landscape, run, how)
+        run.strain += strain
+    else:
+        strain = 0.0 if done < 0 else how.strain_at(done + 1) - how.strain_at(done)
+        found = sheared(landscape, state, how, strain)
+        run.strain = how.strain_at(max(0, done + 1))
     run.state = found.state
     run.steps += 1
-    row = _row(landscape, found, run, how)
+    row = _row(landscape, found, run, how, _Step(strain, before))
     run.evaluations += landscape.evaluations - evaluations
     run.wall_seconds += time.perf_counter() - began
     run.u, run.stress, run.pressure = row.u, row.stress, row.pressure
@@ -246,9 +329,25 @@ def sheared(landscape: Landscape, state: State, how: QuasistaticShear, strain: f
     deformed = state.deformed(how.gradient(state.dimension, strain)).with_least_tilt()
     # The continuation depends on the state alone, also after reading it from a file.
     landscape.forget_pairs()
-    stop = Stop(how.tolerance)
-    found = minimise(landscape, deformed, "auto", stop)
-    return _at_pressure(landscape, found, stop, how.hold_pressure) if how.hold_pressure else found
+    goal = how.goal()
+    if goal is None:
+        return minimise(landscape, deformed, "auto", Stop(how.tolerance))
+    return goal.find(landscape, deformed)
+
+
+def _stressed(landscape: Landscape, run: Sheared, how: QuasistaticShear) -> tuple[Minimum, float]:
+    """Raise the shear stress, and return the minimum, or the state that flows, with the strain to it."""
+    goal = how.next_stress(run)
+    landscape.forget_pairs()
+    at = Settling(run.state)
+    try:
+        while not at.done:
+            settle(landscape, at, goal)
+    except FlowError:
+        run.flows = True
+        return minimise(landscape, at.state, "auto", Stop(how.tolerance)), at.sheared
+    assert at.present is not None
+    return at.present, at.sheared
 
 
 def pressure_of(found: Minimum) -> float:
@@ -257,52 +356,28 @@ def pressure_of(found: Minimum) -> float:
     return -found.evaluation.strain_gradient / (D * found.state.volume)
 
 
-def _at_pressure(landscape: Landscape, found: Minimum, stop: Stop, asked: float) -> Minimum:
-    """Strain the box isotropically until a minimum has the target pressure."""
-    tried = _FIRST_STRAIN
-    for _ in range(_MOST_MINIMA):
-        pressure = pressure_of(found)
-        if abs(pressure / asked - 1) <= _ACCURACY:
-            return found
-        if pressure < _UNJAMMED * asked:
-            state, tried = found.state.strained(-tried), min(2 * tried, _LARGEST_STRAIN)
-        else:
-            state = followed(landscape, found, _strain_to(landscape, found, asked))
-        found = minimise(landscape, state, "auto", stop)
-    msg = (
-        f"the pressure was {pressure_of(found):.6g} after {_MOST_MINIMA} minimisations, expected {asked:g};"
-        " hold a larger pressure"
-    )
-    raise PressureError(msg)
+class _Step(NamedTuple):
+    """The last step: its strain, and normal stresses before it, if they are held."""
+
+    strain: float
+    before: _Normal | None
 
 
-def _strain_to(landscape: Landscape, found: Minimum, asked: float) -> float:
-    """Return the strain that reaches the target pressure, as long as contacts stay."""
-    pressure = pressure_of(found)
-    there = followed(landscape, found, -_TRIED)
-    evaluation = landscape.evaluate(there)
-    stiffness = (
-        pressure_of(replace(found, state=there, evaluation=evaluation)) - pressure
-    ) / _TRIED
-    if stiffness <= 0:  # sliding
-        return math.copysign(_TRIED, pressure - asked)
-    return float(np.clip((pressure - asked) / stiffness, -_LARGEST_STRAIN, _LARGEST_STRAIN))
-
-
-def _row(landscape: Landscape, found: Minimum, run: Sheared, how: QuasistaticShear) -> Row:
+def _row(
+    landscape: Landscape, found: Minimum, run: Sheared, how: QuasistaticShear, step: _Step
+) -> Row:
     """Measure a minimum."""
     packing = found.state.packing(landscape.particles)
     tensor = landscape.stress(found.state)
     u, stress = found.energy_density, how.resisted(tensor)
     order, counts = _order(packing), Contacts.of(packing, landscape.k_e, landscape.sides).counts
     pressure, volume = pressure_of(found), found.state.volume
-    strain = how.strain_at(run.steps)
-    done = strain - how.strain_at(max(run.steps - 1, 0))
-    given = 0.5 * (run.stress * run.volume + stress * volume) * done
-    given += 0.5 * (run.pressure + pressure) * (run.volume - volume)
+    given = 0.5 * (run.stress * run.volume + stress * volume) * step.strain
+    if step.before:
+        given += how.work(step.before, _Normal.of(landscape, found.state, pressure))
     lost = (run.u * run.volume + given) / volume - u
     return Row(
-        step=run.steps, strain=strain, phi=packing.phi, u=u, pressure=pressure,
+        step=run.steps, strain=run.strain, phi=packing.phi, u=u, pressure=pressure,
         **ShearStress.of(tensor)._asdict(), z=counts.z, z_single=counts.z_single, rattlers=counts.n_rattlers,
         S_2=order.S_n, director=order.theta_n, stress=stress,
         lost=lost if run.steps > 0 else 0.0, residual=found.residual.largest,

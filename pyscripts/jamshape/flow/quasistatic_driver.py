@@ -21,7 +21,19 @@ MOST_STEPS_PER_FRAME = 50
 _ROW = tuple(
     name for name in quasistatic.Row._fields if name not in {"step", "wall_seconds", "residual"}
 )
-_COUNTS = ("steps", "u", "stress", "pressure", "volume", "evaluations", "wall_seconds")
+_COUNTS = (
+    *(
+        "steps",
+        "u",
+        "stress",
+        "pressure",
+        "volume",
+        "strain",
+        "flows",
+        "evaluations",
+        "wall_seconds",
+    ),
+)
 
 
 _ARGUMENTS = {
@@ -72,17 +84,17 @@ class QuasistaticDriver:
     def __init__(self, first: Packing, how: QuasistaticShear, frames: int, run: Sheared) -> None:
         self._first, self._how, self._run = first, how, run
         self._landscape = Landscape(first)
-        self._per_frame = max(1, min(MOST_STEPS_PER_FRAME, how.steps // frames))
+        known = how.steps if not how.stress_step else frames
+        self._per_frame = max(1, min(MOST_STEPS_PER_FRAME, known // frames))
 
     @property
     def done(self) -> bool:
         """Whether the final strain is reached."""
-        return self._run.steps >= self._how.steps
+        return self._how.is_over(self._run)
 
     def first(self) -> Row:
         """Return the progress at the start."""
-        strain = self._how.strain_at(max(0, self._run.steps))
-        return Row(self._told(f"strain {strain:.4f}"))
+        return Row(self._told(f"strain {self._run.strain:.4f}"))
 
     def advance(self) -> Row:
         """Minimise the start, or shear by a step and minimise."""
@@ -99,8 +111,9 @@ class QuasistaticDriver:
     def frame(self) -> Packing:
         """Return the present state; its time is the strain."""
         run = self._run
-        strain = self._how.strain_at(max(0, run.steps))
-        return dataclasses.replace(run.state.packing(self._first), step=run.steps + 1, time=strain)
+        return dataclasses.replace(
+            run.state.packing(self._first), step=run.steps + 1, time=run.strain
+        )
 
     def checkpoint(self) -> Checkpoint:
         """Return the state and all counts."""
@@ -115,4 +128,6 @@ class QuasistaticDriver:
         """Nothing is held outside of Python."""
 
     def _told(self, text: str) -> Told:
-        return Told("quasistatic shear", text, max(0, self._run.steps) / self._how.steps)
+        run, how = self._run, self._how
+        part = run.strain / how.strain_end if how.stress_step else max(0, run.steps) / how.steps
+        return Told("quasistatic shear", text, min(1.0, part))

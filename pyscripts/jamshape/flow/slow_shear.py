@@ -1,4 +1,4 @@
-"""Shear at any rate, however slow, by implicit steps. In two dimensions; needs no LAMMPS."""
+"""Shear at any rate, however slow, by implicit steps; needs no LAMMPS."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from jamshape.flow.host import Host
 from jamshape.flow.implicit import METHODS, Flow, Leg
 from jamshape.flow.shear import FLOWS
 from jamshape.landscape import Landscape
-from jamshape.measures.order import planar_order
+from jamshape.measures.order import nematic_of
 from jamshape.measures.stress import ShearStress
 
 
@@ -54,7 +54,8 @@ class SlowShear:
     def leg(self, flow: Flow, phi: float) -> Leg:
         """Return the host, and for how long it applies."""
         del phi
-        return Leg(Host.shearing(self.gdot, self.flow), (self.strain_end - flow.strain) / self.gdot)
+        host = Host.shearing(self.gdot, self.flow, flow.state.dimension)
+        return Leg(host, (self.strain_end - flow.strain) / self.gdot)
 
     def is_over(self, flow: Flow, phi: float) -> bool:
         """Whether the end is reached."""
@@ -66,7 +67,7 @@ class SlowShear:
         state = flow.state
         packing = state.packing(landscape.particles)
         stress = ShearStress.of(landscape.stress(state))._asdict()
-        order = planar_order(packing)
+        order = nematic_of(packing)
         return stress | {
             f"{'shear' if self.flow == 'simple' else 'pure'}_strain": flow.strain,
             "z": Contacts.of(packing, landscape.k_e, landscape.sides).z,

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from jamshape.arguments import checked
 from jamshape.checks import (
+    RANGES,
     ArgumentError,
     Range,
     require_given,
@@ -37,12 +38,13 @@ PHI = (0.4, 0.9)
 """Default packing fractions of the random start and of the end of a compression."""
 
 PHI_SLOW = (None, 0.9)
-"""Default packing fractions of the start and of the end of a slow compression; None for 0.8 or those of a start."""
+"""Default packing fractions of the start and of the end of a slow compression; None for 0.8, 0.5 in 3D, or that of a
+start."""
 
 KAPPA_SLOW = 1e-8
 """Default rate of a slow compression."""
 
-_PHI_HANDED_OVER = 0.8
+_PHI_HANDED_OVER = {2: 0.8, 3: 0.5}
 _SAME = 1e-9  # of packing fractions, up to rounding
 _DT, _ERROR = 0.05, 1e-4
 
@@ -164,6 +166,7 @@ def slow_compress(
     particles: Particles | None = None,
     *,
     n: int | None = None,
+    dimension: int | None = None,
     phi: tuple[float | None, float] | None = PHI_SLOW,
     kappa: float | Sequence[tuple[float, float]] = KAPPA_SLOW,
     p_end: float = math.inf,
@@ -177,7 +180,7 @@ def slow_compress(
     seconds: float | None = None,
     progress: bool = True,
 ) -> RunFile:
-    """Compress particles in the plane through jamming at any rate, however slow, with implicit time steps.
+    """Compress particles through jamming at any rate, however slow, with implicit time steps.
 
     Parameters
     ----------
@@ -185,13 +188,15 @@ def slow_compress(
         Such as ``Spherocylinders(alpha=4)``; omit with a start.
     n : int, optional
         Number of particles; 256 by default, or those of the start.
+    dimension : int, optional
+        2 or 3; 2 by default, or that of the start.
     phi : (float, float), optional
-        Packing fraction at the end of a fast compression in LAMMPS, by default 0.8 or that of the start, and final
-        packing fraction.
+        Packing fraction at the end of a fast compression in LAMMPS, by default 0.8, in 3D 0.5, or that of the start, and
+        final packing fraction.
     kappa : float, [1/time], or sequence of (float, float)
         Compression rate: the box shrinks with dL/dt = -kappa L. In Python also pairs of a packing fraction and the
         rate used from there on, ascending.
-    p_end : float, [energy / length^2]
+    p_end : float, [energy / length^D]
         Final pressure: stop also when it is reached.
     seed : int, optional
         Random seed of the start; 1 by default.
@@ -231,7 +236,7 @@ def slow_compress(
     >>> round(float(run.phi[-1]), 6)
     0.72
     """
-    require_no_effect("start", start, particles=particles, n=n, seed=seed)
+    require_no_effect("start", start, particles=particles, n=n, dimension=dimension, seed=seed)
     phi_start, phi_end = phi or PHI_SLOW
     require_stated(
         phi_end=phi_end, integration_tolerance=integration_tolerance, largest_drop=largest_drop
@@ -245,14 +250,16 @@ def slow_compress(
     for _, rate in protocol.rates:
         require_stated(kappa=rate)
     at = place(file, "slow.h5")
-    of = _start_of(particles, start, phi=(phi_start, phi_end), n=n, seed=seed)
+    of = _start_of(particles, start, phi=(phi_start, phi_end), n=n, seed=seed, dimension=dimension)
 
     def first() -> Packing:
-        packing = of.known or compressed_start(of.random(_PHI_RANDOM), of.phi)
+        # Random insertion of bodies in space may end far below that of rods in the plane.
+        random = _PHI_RANDOM if of.dimension == 2 else None
+        packing = of.known or compressed_start(of.random(random), of.phi)
         _require_end_ahead(packing, protocol)
         return packing
 
-    plan = implicit_driver.plan(first, protocol, of.made_from)
+    plan = implicit_driver.plan(first, protocol, of.made_from | {"dimension": of.dimension})
     recorded(at.path, plan, again=again, seconds=seconds, progress=progress)
     return RunFile(*at)
 
@@ -266,11 +273,13 @@ def _start_of(
     """Return the start of a slow compression; refuse a packing fraction that differs from that of a given one."""
     phi_start, phi_end = phi
     if start is None:
-        phi_start = _PHI_HANDED_OVER if phi_start is None else phi_start
-        require_in("phi_start", phi_start, _HANDED_OVER)
+        dimension = 2 if sizes["dimension"] is None else sizes["dimension"]
+        require_one_of("dimension", dimension, (2, 3))
+        phi_start = _PHI_HANDED_OVER[dimension] if phi_start is None else phi_start
+        require_in("phi_start", phi_start, _HANDED_OVER if dimension == 2 else RANGES["phi_start"])
         require_rising(phi_start, phi_end)
         return Start.of(particles, Asked(phi=phi_start, **sizes), None, usual_phi=phi_start)
-    of = Start.of(particles, Asked(phi=None, **sizes), start, usual_phi=_PHI_HANDED_OVER)
+    of = Start.of(particles, Asked(phi=None, **sizes), start, usual_phi=phi_end)
     if (
         of.known
         and phi_start is not None

@@ -45,7 +45,7 @@ def ensemble(
     folder : path, optional
         Folder for the packings, ``SHAPE_seedN.h5``, as of ``jamshape sweep``; not kept by default.
     file : path, optional
-        H5MD file of the table, as in `compress`; a stopped ensemble resumes from it.
+        H5MD file of the table, as in `compress`; a stopped ensemble resumes from it, also by `resume`.
     again, seconds, progress
         See `compress`.
     **settings
@@ -85,6 +85,7 @@ def ensemble(
     if folder is not None:
         Path(folder).mkdir(parents=True, exist_ok=True)
     at = place(file, "ensemble.h5")
-    plan = driver.plan(recipe, seeds, jobs, None if folder is None else Path(folder).absolute())
+    kept = None if folder is None else Path(folder).absolute()
+    plan = driver.plan(recipe, seeds, driver.Means.of(jobs, kept, particles, settings))
     recorded(at.path, plan, again=again, seconds=seconds, progress=progress)
     return EnsembleFile(*at)

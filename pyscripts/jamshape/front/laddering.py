@@ -1,4 +1,4 @@
-"""Ladders: one packing at several energies, each state from the one before."""
+"""Ladders: one packing at several energies or pressures, each state from the one before."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from jamshape.arguments import checked
-from jamshape.checks import RANGES, ArgumentError, require_in, require_stated
+from jamshape.checks import RANGES, ArgumentError, require_in, require_no_effect, require_stated
 from jamshape.front.progress import place
 from jamshape.front.reading import Held
 from jamshape.front.recorded import recorded
@@ -15,7 +15,6 @@ from jamshape.front.starts import start_of, told_of
 from jamshape.landscape import Landscape
 from jamshape.protocols.ladder import Ladder, plan
 
-_ENERGY = RANGES["u0"]._replace(also=())
 _MOST = 7000  # values, which are an attribute of the file
 
 
@@ -24,6 +23,8 @@ def ladder(
     packing: Held,
     *,
     u0: Sequence[float] | None = None,
+    pressure: Sequence[float] | None = None,
+    box: str = "isotropic",
     accuracy: float = 1e-7,
     tolerance: float = 1e-8,
     file: str | Path | None = None,
@@ -31,16 +32,18 @@ def ladder(
     seconds: float | None = None,
     progress: bool = True,
 ) -> LadderFile:
-    """Take a packing through energies, up or down; keep each state, and find which contacts open and close.
+    """Take a packing through energies or pressures, up or down; keep each state, and find which contacts open and close.
 
     Parameters
     ----------
     packing : Packing or path
         Packing, or a file that `load` reads, whose last frame to take.
-    u0 : sequence of float, [energy / length^D]
-        Energy densities, in the order in which to reach them.
+    u0, pressure : sequence of float, [energy / length^D]
+        Energy densities or pressures, in the order in which to reach them.
+    box : str
+        How the box yields, as in `make_packing`.
     accuracy : float
-        Largest abs(u - u0) / u0.
+        Largest abs(u - u0) / u0, or relative error of the pressure tensor.
     tolerance : float
         Largest net force and torque of a particle over the mean bond force.
     file : path, optional
@@ -51,7 +54,7 @@ def ladder(
     Returns
     -------
     LadderFile
-        A row and a frame for the start and each energy; ``run.contact_changes()`` lists contacts that change between.
+        A row and a frame for the start and each value; ``run.contact_changes()`` lists contacts that change between.
 
     Raises
     ------
@@ -61,7 +64,7 @@ def ladder(
     Warns
     -----
     NotReachedWarning
-        If no minimum with balanced forces was found at some energies; ``run.reached`` and ``run.at_rest`` say where.
+        If no minimum with balanced forces was found at some values; ``run.reached`` and ``run.at_rest`` say where.
 
     Examples
     --------
@@ -73,16 +76,18 @@ def ladder(
     [0.0001, 1e-05, 1e-06]
     """
     require_stated(accuracy=accuracy, tolerance=tolerance)
-    if not u0:
-        said = "{u0:name} has no values, expected one energy density or more"
-        raise ArgumentError(said, {"u0": u0})
-    if len(u0) > _MOST:
-        said = f"{{u0:name}} has {len(u0)} values, expected at most {_MOST}; divide them over several runs"
-        raise ArgumentError(said, {"u0": u0})
-    for value in u0:
-        require_in("u0", value, _ENERGY)
+    require_no_effect("pressure", pressure, u0=u0)
+    name, values = ("u0", u0) if pressure is None else ("pressure", pressure)
+    if not values:
+        said = f"{{{name}:name}} has no values, expected one or more"
+        raise ArgumentError(said, {name: values})
+    if len(values) > _MOST:
+        said = f"{{{name}:name}} has {len(values)} values, expected at most {_MOST}; divide them over several runs"
+        raise ArgumentError(said, {name: values})
+    for value in values:
+        require_in(name, value, RANGES[name]._replace(also=()))
     start = start_of(packing)
-    how = Ladder("u0", tuple(u0), accuracy, tolerance)
+    how = Ladder(name, tuple(values), accuracy, tolerance, box)
     how.require_reachable(Landscape(start))
     at = place(file, "ladder.h5")
     recorded(

@@ -44,6 +44,7 @@ def make_packing(
     search: str | None = None,
     minimiser: str | None = None,
     strict: bool = False,
+    stable_to_shear: bool = False,
     threads: int = 1,
     file: str | Path | None = None,
     again: bool = False,
@@ -112,6 +113,9 @@ def make_packing(
     strict : bool
         Continue at fixed u, along floppy modes, until no mode has an eigenvalue below minus its error bound;
         ``n_negative`` of the results counts those that do. Rods of alpha = 4 end at saddles otherwise.
+    stable_to_shear : bool
+        Continue until no motion of particles and box lowers the enthalpy (Dagois-Bohy et al. 2012), in a box that is
+        "free", the default then. ``tries`` of the results counts packings at the target up to the stable one.
     threads : int
         Number of threads; worth it from thousands of particles on. The last bits depend on it, and with them
         which of many minima is found; an interrupted packing resumes with any number. Many packings take less
@@ -158,6 +162,7 @@ def make_packing(
         protocol=protocol, phi_start=phi_start, kappa=kappa, p_end=p_end, phi_end=phi_end,
         phi_thermal=phi_thermal, n_sweeps=n_sweeps, delta_phi=delta_phi, start=start,
         search=search, minimiser=minimiser, strict=strict,
+        stable_to_shear=stable_to_shear,
     )  # fmt: skip
     return made_or_kept(
         recipe, file, threads=threads, again=again, seconds=seconds, progress=progress

@@ -10,13 +10,12 @@ from jamshape.checks import RANGES, require_in, require_no_effect, require_state
 from jamshape.front.making import made_or_kept
 from jamshape.front.packing import Packing
 from jamshape.front.reading import Held, packing_of
-from jamshape.front.starts import digest, told_of
-from jamshape.minima.boxes import FIXED
+from jamshape.front.starts import told_of
+from jamshape.minima.boxes import FIXED, FREE
 from jamshape.minima.target import FixedBox, Target
 from jamshape.protocols.defaults import aim_of
 from jamshape.protocols.recipe import Aim, Given, Recipe
 from jamshape.shapes.particles import Particles
-
 
 _EVALUATIONS = 200_000
 
@@ -34,6 +33,7 @@ def minimise(
     minimiser: str | None = None,
     evaluations: int | None = None,
     strict: bool = False,
+    stable_to_shear: bool = False,
     threads: int = 1,
     file: str | Path | None = None,
     again: bool = False,
@@ -58,6 +58,8 @@ def minimise(
     strict : bool
         Continue at the same box, along floppy modes, until no mode has an eigenvalue below minus its error bound;
         ``n_negative`` of the results counts those that do.
+    stable_to_shear : bool
+        As in `make_packing`.
     threads : int
         Number of threads, as in `make_packing`.
     file : path, optional
@@ -100,13 +102,14 @@ def minimise(
     state = packing_of(packing)
     goal: FixedBox | Aim = FixedBox(tolerance, minimiser or "auto")
     targets = {"u0": u0, "pressure": pressure, "phi": phi}
+    box = FREE if stable_to_shear and box is None else box
     if box not in {None, FIXED} or any(value is not None for value in targets.values()):
         goal = _aim(targets, box, accuracy, tolerance)
         named = next(name for name, value in targets.items() if value is not None)
         require_no_effect(named, targets[named], minimiser=minimiser, evaluations=evaluations)
     elif accuracy is not None:
         require_with("u0", None, accuracy=accuracy)
-    recipe = _recipe(state, Given(state, _made_from(state), goal, most), strict=strict)
+    recipe = _recipe(state, Given(state, _made_from(state), goal, most), strict, stable_to_shear)
     return made_or_kept(
         recipe, file, threads=threads, again=again, seconds=seconds, progress=progress
     )
@@ -130,11 +133,12 @@ def _aim(
 def _made_from(state: Packing) -> dict[str, object]:
     """Describe the state, and tell it from others, wherever its file lies."""
     name = state.file.name if state.file else "packing"
-    return told_of(state) | {"start": name, "start_digest": digest(state)}
+    return told_of(state) | {"start": name}
 
 
-def _recipe(state: Packing, way: Given, *, strict: bool) -> Recipe:
+def _recipe(state: Packing, way: Given, strict: bool, stable_to_shear: bool) -> Recipe:
     particles = Particles.given(state.shape, state.diameters, state.exponent, state.species)
     low, high = RANGES["phi_start"].low, RANGES["phi_start"].high
     phi = min(max(state.phi, low), high)
-    return Recipe(particles, state.n, state.dimension, 1, phi, way, target=None, strict=strict)
+    numbers = (state.n, state.dimension, 1, phi)
+    return Recipe(particles, *numbers, way, None, strict=strict, stable_to_shear=stable_to_shear)

@@ -11,10 +11,10 @@ from jamshape.arguments import checked
 from jamshape.checks import Range, require_in, require_no_effect, require_one_of, require_other_file
 from jamshape.files.disk import require_hdf5_name, settled
 from jamshape.files.outcomes import warn_unless_reached
-from jamshape.front.packing import Packing
+from jamshape.front.packing import Packing, public
 from jamshape.front.reading import Held, packing_of
 from jamshape.landscape import Landscape, State
-from jamshape.vibration.ensembles import TOLD, to_store
+from jamshape.vibration.ensembles import TOLD, of_packing, to_store
 from jamshape.vibration.hessian import DynamicalMatrix, DynamicalMatrixOptions, dynamical_matrix
 from jamshape.vibration.sparse_modes import lowest as lowest_modes
 from jamshape.vibration.sparse_modes import near as modes_near
@@ -24,6 +24,7 @@ from jamshape.vibration.table import (
     ModeTable,
     holds_modes,
     read_modes,
+    read_moved,
     tabulate,
     write_modes,
 )
@@ -50,7 +51,7 @@ class Modes(ModeTable):
     about : mapping of str to number or str
         Properties of the packing.
     packing : Packing, optional
-        None for modes that were read from a file.
+        None for modes that were read from a file without eigenvectors.
     file : Path, optional
         File they were read from.
     matrix : DynamicalMatrix, optional
@@ -89,8 +90,11 @@ class Modes(ModeTable):
     @classmethod
     def read(cls, path: Path) -> Modes:
         """Read modes from a file; errors as `read_modes`."""
-        table = read_modes(path)
-        return cls.of(table, dict(table.attributes), file=path)
+        table, packing = read_modes(path), read_moved(path)
+        known = dict(table.attributes)
+        return cls.of(
+            table, known, file=path, packing=packing and public(packing, of_packing(table))
+        )
 
     @property
     def table(self) -> Modes:
@@ -110,7 +114,7 @@ class Modes(ModeTable):
 
     @checked
     def save(self, path: str | Path, *, vectors: bool = True) -> None:
-        """Write the modes to an HDF5 file, with or without eigenvectors, replacing modes in it.
+        """Write the modes to an HDF5 file, with or without eigenvectors and packing, replacing modes in it.
 
         Raises
         ------
@@ -120,7 +124,7 @@ class Modes(ModeTable):
         read = [self.packing.file] if self.packing and self.packing.file else []
         require_hdf5_name(Path(path))
         require_modes_file(Path(path), read)
-        write_modes(path, self, self.about, vectors=vectors)
+        write_modes(path, self, self.about, vectors=vectors, packing=self.packing)
 
     def __repr__(self) -> str:
         known = [name for name in TOLD if self.has_band(name)]

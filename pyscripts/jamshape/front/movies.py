@@ -184,7 +184,10 @@ def _swinging(modes: Modes, mode: int | None, amplitude: float | None) -> list[S
     """Return an oscillation along an eigenvector."""
     packing, vectors = modes.packing, modes.vectors
     if packing is None or not vectors.shape[1]:
-        msg = "the modes were read from a file, expected modes with their packing, as js.modes(packing) returns them"
+        msg = (
+            f"{modes.file or 'modes'} holds no packing with its eigenvectors, expected both; write it again with"
+            " modes.save(path) or jamshape modes --vectors"
+        )
         raise ValueError(msg)
     if mode is None:
         text = "{mode:name} is missing, expected the number of a mode, from 0"

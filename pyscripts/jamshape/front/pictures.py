@@ -162,7 +162,7 @@ def _cyclic(run: CyclicShearFile, axes: Axes, color: str) -> None:
 def _quasistatic(run: QuasistaticShearFile, axes: Axes, color: str) -> None:
     del color
     who = system_of(run.about, *read_style(run.file))
-    if run.cycles:
+    if run.steps_per_cycle:
         draw_cycles(axes, Cycles(run.strain, run.stress, run.steps_per_cycle), who)
         return
     draw_steps(axes, run.observables, who)
@@ -181,7 +181,8 @@ def _ensemble(table: EnsembleFile, axes: Axes, color: str) -> None:
 def _ladder(run: LadderFile, axes: Axes, color: str) -> None:
     del color
     rungs = Rungs(run.values, run["z"], run.opened, run.closed)
-    draw_rungs(axes, rungs, system_of(run.about, *read_style(run.file)))
+    label = {"u0": "energy density $u$", "pressure": "pressure $p$"}[run.parameter]
+    draw_rungs(axes, rungs, system_of(run.about, *read_style(run.file)), label)
 
 
 def _modes(modes: Modes, axes: Axes, color: str) -> None:

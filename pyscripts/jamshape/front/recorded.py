@@ -28,7 +28,7 @@ from jamshape.front.run import (
     ShearFile,
 )
 from jamshape.packing import Packing
-from jamshape.protocols import ladder
+from jamshape.protocols import ensemble, ladder
 from jamshape.protocols.approach import FOR_A_PACKING
 from jamshape.protocols.ensemble import ENSEMBLE
 from jamshape.protocols.ladder import Ladder
@@ -42,8 +42,8 @@ class Kind(NamedTuple):
 
     opens: type[Recorded]
     """Class of the run."""
-    plan_of: Callable[[Mapping[str, Any]], Plan] | None = None
-    """Makes a plan from the attributes of a file; None if they do not tell all, as of parts of a packing and of ensembles."""
+    plan_of: Callable[[Mapping[str, Any]], Plan | None] | None = None
+    """Makes a plan from the attributes of a file; None if they do not tell all, as of parts of a packing."""
 
 
 def recorded(path: Path, plan: Plan, *, again: bool, seconds: float | None, progress: bool) -> None:
@@ -62,13 +62,14 @@ def resume(file: str | Path, *, seconds: float | None = None, progress: bool = T
     Parameters
     ----------
     file : path
-        File of `compress`, `slow_compress`, `shear`, `cyclic_shear`, `quasistatic_shear` or `ladder`.
+        File of `compress`, `slow_compress`, `shear`, `cyclic_shear`, `quasistatic_shear`, `ladder` or `ensemble`; one of
+        particles with a distribution of their own needs the call that began it.
     seconds, progress
         See `compress`.
 
     Returns
     -------
-    RunFile, ShearFile, CyclicShearFile, QuasistaticShearFile or LadderFile
+    RunFile, ShearFile, CyclicShearFile, QuasistaticShearFile, LadderFile or EnsembleFile
 
     Raises
     ------
@@ -90,12 +91,13 @@ def resume(file: str | Path, *, seconds: float | None = None, progress: bool = T
     True
     """
     path = Path(file)
+    stored = read_attributes(path)
     plan_of = kind_of(path).plan_of
-    if plan_of is None:
-        kind = read_attributes(path)[KIND]
-        msg = f"{path} is of the kind {kind}, expected a run that its file describes alone; repeat the call that began it"
+    plan = plan_of and plan_of(stored)
+    if plan is None:
+        msg = f"{path} is of the kind {stored[KIND]}, expected a run that its file describes alone; repeat the call that began it"
         raise FileFormatError(msg)
-    plan = dataclasses.replace(plan_of(read_attributes(path)), settings={})
+    plan = dataclasses.replace(plan, settings={})
     recorded(path, plan, again=False, seconds=seconds, progress=progress)
     return run_file(path)
 
@@ -117,7 +119,7 @@ def kind_of(path: Path) -> Kind:
         return kind
     msg = (
         f"{path} holds no run, expected a file of compress, slow_compress, shear, cyclic_shear,"
-        " quasistatic_shear or ladder"
+        " quasistatic_shear, ladder or ensemble"
     )
     raise FileFormatError(msg)
 
@@ -162,7 +164,7 @@ KINDS: dict[str, Kind] = {
     "slow shear": Kind(ShearFile, _plan_implicit),
     "quasistatic shear": Kind(QuasistaticShearFile, _plan_quasistatic),
     "ladder": Kind(LadderFile, _plan_ladder),
-    ENSEMBLE: Kind(EnsembleFile),
+    ENSEMBLE: Kind(EnsembleFile, ensemble.plan_again),
     FOR_A_PACKING: Kind(RunFile),
     MAKING: Kind(RunFile),
 }

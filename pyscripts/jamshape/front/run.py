@@ -9,13 +9,20 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from jamshape.arguments import checked
 from jamshape.arrays import BoolArray, FloatArray, IntArray
-from jamshape.checks import RANGES, NotReachedWarning, Range, require_in, require_number
+from jamshape.checks import (
+    RANGES,
+    NotReachedWarning,
+    Range,
+    require_in,
+    require_number,
+    require_positive,
+)
 from jamshape.files.content import add_attributes
 from jamshape.files.disk import named, settled
 from jamshape.files.h5md import (
@@ -34,12 +41,14 @@ from jamshape.front.packing import Packing
 from jamshape.front.progress import follow, place
 from jamshape.landscape import Landscape, State
 from jamshape.measures.contact_changes import (
+    RETURNED,
     At,
     ContactChange,
     Search,
     contact_changes,
     numbers_of_changes,
 )
+from jamshape.measures.cycles import Cycle, Ends, Rows, cycles_of
 from jamshape.measures.events import Event, stress_drops
 from jamshape.measures.jamming import Jamming, Tried, minimised_frames
 from jamshape.measures.onset import OnsetFit, fit_onset
@@ -328,6 +337,9 @@ class CyclicShearFile(Recorded):
     <Cyclic shear of 24 spherocylinders in 2D at phi = 0.8: 4 cycles to strains of +-0.02, displacement = ..., in cycles.h5>
     >>> run.displacement.shape, run.dissipated.shape, len(run)
     ((4,), (4,), 5)
+    >>> cycles = run.cycles()
+    >>> cycles[-1].number, cycles[-1].largest < cycles[0].largest, cycles[-1].storage > 0
+    (4, True, True)
     """
 
     @property
@@ -360,6 +372,32 @@ class CyclicShearFile(Recorded):
         whole = means[: len(means) // rows * rows].reshape(-1, rows)
         return np.asarray(whole.mean(axis=1) * period)
 
+    @checked
+    def cycles(self, tolerance: float = RETURNED, *, first: int = 1) -> list[Cycle]:
+        """Describe all whole cycles: energies, storage and loss modulus, and whether particles return.
+
+        All particles count in the distances, which are those of states that were kept: with `frames`, not all are.
+
+        Parameters
+        ----------
+        tolerance : float
+            Largest distance of a particle of a reversible cycle, over the smallest inner radius.
+        first : int
+            Number of the first cycle to describe, counted from 1 or, if negative, from the end.
+
+        Returns
+        -------
+        list of Cycle
+            ``number``, ``work``, ``lost``, ``storage`` and ``loss`` [energy / length^D], ``rms`` and ``largest``
+            distance of particles from where the cycle began, the number of contacts that ``changed``, and
+            ``is_reversible``; see `jamshape.measures.cycles`.
+        """
+        require_positive(tolerance=tolerance)
+        frames, period = recorded_frames(self.file), float(self.about["period"])
+        kept = {round(time / period): k for k, time in enumerate(frames.times.tolist())}
+        rows = Rows(self.strain, self.stress, self.dissipated, int(self.about["rows"]))
+        return cycles_of(rows, Ends(kept, frames, rattlers=True), tolerance, first)
+
     def __repr__(self) -> str:
         cycles = len(self.displacement)
         start = (
@@ -367,6 +405,13 @@ class CyclicShearFile(Recorded):
         )
         end = f", displacement = {self.displacement[-1]:.3g}" if cycles else ""
         return f"<Cyclic shear of {self._who()} at {start}{end}{self._where()}>"
+
+
+class YieldStress(NamedTuple):
+    """A yield stress with its error, [energy / length^D]."""
+
+    value: float
+    error: float
 
 
 class QuasistaticShearFile(Recorded):
@@ -391,14 +436,48 @@ class QuasistaticShearFile(Recorded):
         return self["strain"]
 
     @property
-    def cycles(self) -> int:
-        """Number of cycles; 0 without an amplitude."""
-        return int(self.about.get("cycles", 0))
-
-    @property
     def steps_per_cycle(self) -> int:
         """Number of steps, and so of rows, of each cycle; 0 without cycles."""
-        return QUARTERS * self._how.quarter if self.cycles else 0
+        return QUARTERS * self._how.quarter if self._how.cycles else 0
+
+    @checked
+    def cycles(self, tolerance: float = RETURNED, *, first: int = 1) -> list[Cycle]:
+        """Describe all whole cycles, as `CyclicShearFile.cycles`; none without an amplitude.
+
+        Rattlers, whose places are arbitrary, do not count in the distances.
+
+        Parameters
+        ----------
+        tolerance : float
+            Largest distance of a particle of a reversible cycle, over the smallest inner radius.
+        first : int
+            Number of the first cycle to describe, counted from 1 or, if negative, from the end.
+
+        Examples
+        --------
+        >>> import jamshape as js
+        >>> discs = js.Spherocylinders(alpha=0)
+        >>> packing = js.make_packing(discs, n=16, u0=1e-4, progress=False)
+        >>> run = js.quasistatic_shear(start=packing, step=1e-5, amplitude=1e-4, cycles=2, progress=False)
+        >>> cycle = run.cycles()[-1]
+        >>> cycle.number, cycle.is_reversible, cycle.changed, abs(cycle.loss) < 1e-6 * cycle.storage
+        (2, True, 0, True)
+        """
+        require_positive(tolerance=tolerance)
+        per_cycle = self.steps_per_cycle
+        if not per_cycle:
+            return []
+        frames = recorded_frames(self.file)
+        # Frame 0 is the start before its minimisation.
+        kept = {
+            (step - 1) // per_cycle: k
+            for k, step in enumerate(frames.steps.tolist())
+            if step > 0 and (step - 1) % per_cycle == 0
+        }
+        done = (len(self.strain) - 1) // per_cycle
+        lost = self["lost"][1 : done * per_cycle + 1].reshape(done, per_cycle).sum(axis=1)
+        rows = Rows(self.strain, self.stress, lost, per_cycle)
+        return cycles_of(rows, Ends(kept, frames, rattlers=False), tolerance, first)
 
     @property
     def _how(self) -> QuasistaticShear:
@@ -427,6 +506,9 @@ class QuasistaticShearFile(Recorded):
             Whether to find out if changes are reversible.
         """
         how = self._how
+        if how.stress_step and (within is not None or step_back):
+            msg = "the run raises the stress, expected one that raises the strain for changes within a distance; leave it out"
+            raise ValueError(msg)
 
         def bring(start: At, value: float) -> PackingLike:
             at, landscape = start.packing, Landscape(start.packing)
@@ -466,6 +548,17 @@ class QuasistaticShearFile(Recorded):
             )
             warnings.warn(NotReachedWarning(said, {"step": None, "seed": None}), stacklevel=3)
 
+    @property
+    def yield_stress(self) -> YieldStress | None:
+        """Shear stress at which the packing begins to flow; None where strains are given, or none was reached.
+
+        Half a step away from the largest stress that it resisted, and from the smallest that it did not.
+        """
+        step = self._how.stress_step
+        if not (step and self.about.get("shear_flows")):
+            return None
+        return YieldStress((len(self["stress"]) - 1.5) * step, 0.5 * step)
+
     def modulus(self) -> float:
         """Slope of the stress in the first step, [energy / length^D]; that of the Hessian for small steps."""
         return float((self.stress[1] - self.stress[0]) / (self.strain[1] - self.strain[0]))
@@ -473,8 +566,8 @@ class QuasistaticShearFile(Recorded):
     @checked
     def steady(self, after: float | None = None) -> SteadyState:
         """Average over the steady state, as in `ShearFile.steady`, along the strain of either sign; not of cycles."""
-        if self.cycles:
-            msg = f"the shear has {self.cycles} cycles, expected one strain without a turn for a steady state"
+        if self._how.cycles:
+            msg = f"the shear has {self._how.cycles} cycles, expected one strain without a turn for a steady state"
             raise ValueError(msg)
         return steady_state(self.observables, np.abs(self.strain), after)
 
@@ -507,7 +600,7 @@ class LadderFile(Recorded):
 
     @property
     def parameter(self) -> str:
-        """Name of the control parameter, ``u0``."""
+        """Name of the control parameter, ``u0`` or ``pressure``."""
         return str(self.about["ladder_parameter"])
 
     @property
@@ -605,7 +698,7 @@ class LadderFile(Recorded):
         return f"<Ladder of {self._who()}: {done} of {asked} values to {end}{self._where()}>"
 
 
-_OBSERVABLE_OF = {"u0": "u"}
+_OBSERVABLE_OF = {"u0": "u", "pressure": "pressure"}
 """Observable of a control parameter."""
 
 

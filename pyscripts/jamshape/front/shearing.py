@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 from jamshape.arguments import checked
@@ -34,14 +33,11 @@ from jamshape.protocols.approach import compressed_start
 from jamshape.protocols.quasistatic import compressed_to
 from jamshape.shapes.particles import Particles
 
-_SLOW = 3e-7  # rate below which implicit steps are faster than explicit ones
+_SLOW = {2: 3e-7, 3: 1e-7}  # rates below which implicit steps are faster than explicit ones
 _ERROR, _IMPLICIT_ERROR = 1e-4, 1e-3  # default tolerances
 
 _FRAMES = 20
 _PHI_NAME = "phi_sheared"  # of the start, in files
-
-# Relative tolerance of the packing fraction of a random start.
-_ROUNDING = 1e-9
 
 
 @accepts_old(tolerance="integration_tolerance")
@@ -94,8 +90,8 @@ def shear(
         Bonds of a side-to-side contact of rods, 1 or 2.
     integrator : str, optional
         ``rkc2``, ``heun/adaptive`` or ``heun`` in LAMMPS, as in `compress`; or ``tr-bdf2`` or ``sdirk2``, which take
-        implicit steps in the plane, without LAMMPS, at a cost that hardly grows as the rate falls. By default ``heun`` with one bond or with `dt`, else ``tr-bdf2``
-        in the plane at rates of 3e-7 and below, and else ``rkc2``.
+        implicit steps, without LAMMPS, at a cost that hardly grows as the rate falls. By default ``heun`` with one bond or with `dt`, else ``tr-bdf2``
+        at rates of 3e-7, in 3D 1e-7, and below, and else ``rkc2``.
     dt : float, [time], optional
         Time step of ``heun``; 0.05 by default.
     integration_tolerance : float, optional
@@ -147,8 +143,9 @@ def shear(
         longest = min(SlowShear.largest_strain, strain / rows)
         error = integration_tolerance or _IMPLICIT_ERROR
         slow = SlowShear(gdot, strain, flow, error, largest_strain=longest, method=integrator)
-        _require_plane(of, sides)
-        plan = implicit_driver.plan(lambda: _flowing(of), slow, of.made_from | {"rows": rows})
+        _require_two_bonds(sides)
+        made_from = of.made_from | {"rows": rows, "dimension": of.dimension}
+        plan = implicit_driver.plan(lambda: _flowing(of), slow, made_from)
     else:
         settings = Shear(
             gdot=gdot, strain_end=strain, flow=flow, dt=min(0.05, 0.01 / gdot) if dt is None else dt,
@@ -291,6 +288,8 @@ def quasistatic_shear(
     cycles: int | None = None,
     flow: str = "simple",
     pressure: float = 0.0,
+    box: str = "isotropic",
+    stress_step: float | None = None,
     tolerance: float = 1e-8,
     seed: int | None = None,
     start: Held | None = None,
@@ -325,6 +324,12 @@ def quasistatic_shear(
         Simple or pure shear.
     pressure : float, [energy / length^D]
         Pressure to hold; 0 holds the volume.
+    box : str
+        How the box yields to the pressure: "isotropic", or components of normal stresses to hold, such as "yy".
+    stress_step : float, [energy / length^D], optional
+        Raise the shear stress by this in each step, instead of the strain, until the box shears to `strain`, where the
+        packing counts as flowing; ``run.yield_stress`` is then known. With a pressure all normal stresses are held, or
+        those of `box`.
     tolerance : float
         Largest net force and torque of a particle over the mean bond force.
     seed : int, optional
@@ -346,7 +351,7 @@ def quasistatic_shear(
     ValueError
         If a number is out of its range or has no effect, the file holds another run, or neither particles nor a start
         is given.
-    PressureError
+    TargetError
         If the pressure cannot be held.
 
     Warns
@@ -366,12 +371,17 @@ def quasistatic_shear(
     require_no_effect("amplitude", amplitude, strain=strain)
     require_with("amplitude", amplitude, cycles=cycles)
     require_stated(frames=frames, strain_step=step, tolerance=tolerance, hold_pressure=pressure)
-    require_given(strain_end=None if strain is None else abs(strain), amplitude=amplitude, cycles=cycles)  # fmt: skip
+    require_given(
+        strain_end=None if strain is None else abs(strain), amplitude=amplitude, cycles=cycles, stress_step=stress_step
+    )  # fmt: skip
     asked = Asked(n, phi, seed, dimension)
     of = Start.of(particles, asked, start, usual_phi=0.9, phi_name=_PHI_NAME)
-    how = QuasistaticShear(step, 0.5 if strain is None else strain, flow, pressure, tolerance)
-    if amplitude is not None:
-        how = replace(how, amplitude=amplitude, cycles=1 if cycles is None else cycles)
+    require_no_effect("stress_step", stress_step, amplitude=amplitude)
+    end = 0.5 if strain is None else strain
+    number = 0 if amplitude is None else 1 if cycles is None else cycles
+    how = QuasistaticShear(
+        step, end, flow, pressure, tolerance, amplitude or 0.0, number, box, stress_step or 0.0
+    )
     at = place(file, "aqs.h5")
     plan = quasistatic_driver.plan(lambda: _still(of), how, frames, of.made_from)
     recorded(at.path, plan, again=again, seconds=seconds, progress=progress)
@@ -380,11 +390,7 @@ def quasistatic_shear(
 
 def _flowing(of: Start) -> Packing:
     """Return the start, compressed at a finite rate."""
-    if of.known:
-        return of.known
-    random = of.random()
-    is_looser = random.phi < of.phi * (1 - _ROUNDING)
-    return compressed_start(random, of.phi) if is_looser else random
+    return of.known or compressed_start(of.random(), of.phi)
 
 
 def _still(of: Start) -> Packing:
@@ -406,7 +412,7 @@ def _usual(gdot: float, dimension: int, *, whole: bool) -> str:
     """Choose the default integrator."""
     if not whole:
         return "heun"
-    return "tr-bdf2" if dimension == 2 and gdot <= _SLOW else "rkc2"
+    return "tr-bdf2" if gdot <= _SLOW[dimension] else "rkc2"
 
 
 def _require_cycle(amplitude: float, period: float, rows: int) -> None:
@@ -421,11 +427,11 @@ def _require_cycle(amplitude: float, period: float, rows: int) -> None:
         raise ArgumentError(said, {"rows": rows})
 
 
-def _require_plane(of: Start, sides: int) -> None:
-    """Refuse what implicit steps do not serve."""
-    if of.dimension != 2 or sides != 2:
+def _require_two_bonds(sides: int) -> None:
+    """Refuse the law on whose kinks implicit steps would end."""
+    if sides != 2:
         msg = (
-            f"implicit steps were requested in {of.dimension} dimensions with {sides} bonds side to side,"
-            " expected 2 and 2; choose another integrator"
+            f"implicit steps were requested with {sides} bonds side to side, expected 2; choose another"
+            " integrator"
         )
         raise ValueError(msg)

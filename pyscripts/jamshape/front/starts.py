@@ -46,7 +46,13 @@ def told_of(start: Packing) -> dict[str, Any]:
     found = {name: results[name] for name in names if name in results}
     # As UTF-8, whatever the locale: names may hold bytes that it cannot decode.
     name = os.fsencode(named(start.file)).decode(errors="replace") if start.file else digest(start)
-    return found | {"n": start.n, "start": name, "phi_start": start.phi}
+    # The digest distinguishes frames of one file.
+    return found | {
+        "n": start.n,
+        "start": name,
+        "start_digest": digest(start),
+        "phi_start": start.phi,
+    }
 
 
 def digest(start: PackingLike) -> str:

@@ -219,18 +219,24 @@ class Landscape:
         (k, n) and (k, k) arrays of float64
             Derivatives of the gradient by each strain, and by two of them.
         """
-        found = self.derivatives(state)  # of the contacts that doubles see, as in factors of the Hessian
+        found = self.derivatives(
+            state
+        )  # of the contacts that doubles see, as in factors of the Hessian
         blocks, places = contracted(found), self._places(found)
         D = self.particles.dimension
         moved = np.einsum("kab,cb->kca", strains, found["separation"])
         by_strain = np.einsum("cij,kcj->kci", blocks[:, :, :D], moved)
         used = places.column >= 0
         pulled = [
-            np.bincount(places.column[used], (one[:, places.variable] * places.scale)[used], self.size)
+            np.bincount(
+                places.column[used], (one[:, places.variable] * places.scale)[used], self.size
+            )
             for one in by_strain
         ]
         own = np.einsum("kci,lci->kl", by_strain[:, :, :D], moved)
-        return np.reshape(pulled, (len(strains), self.size)).astype(np.float64), own.astype(np.float64)
+        return np.reshape(pulled, (len(strains), self.size)).astype(np.float64), own.astype(
+            np.float64
+        )
 
     def rattlers(self, state: State) -> BoolArray:
         """(N,) whether the particle is a rattler (`jamshape.contacts.find_rattlers`)."""

@@ -9,13 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from jamshape import _contact
 from jamshape.arrays import FloatArray
 from jamshape.contacts import Pairs
 from jamshape.landscape.landscape import Evaluation, Landscape
 from jamshape.landscape.newton import LONGEST_STEP, WIDEST_TURN, Factorisation
 from jamshape.landscape.threads import threads
-from jamshape.packing import State
+from jamshape.packing import State, body_axes
 
 # Units of force, energy and length for errors of displacements.
 Units = _contact.StageUnits
@@ -86,18 +88,23 @@ class LocalEnergyModel:
         Landscape whose pair list and evaluation counter are used.
     base : State
         Origin of coordinates.
+    along_bodies : bool
+        In 3D, whether rotations are about the axes of each body at the base, where its drag is diagonal, instead
+        of those of space, and factors solve equations, by iteration where they are incomplete: for stages of a flow.
 
     Notes
     -----
     Uses the number of `threads` at construction.
     """
 
-    def __init__(self, landscape: Landscape, base: State) -> None:
-        self.landscape = landscape
+    def __init__(self, landscape: Landscape, base: State, *, along_bodies: bool = False) -> None:
+        self.landscape, self._along_bodies = landscape, along_bodies
         self._compiled = landscape.bodies.local_energy_model(
             landscape.column, landscape.rotation_length, landscape.turning_radius
         )
         self._compiled.share(threads())
+        if along_bodies:
+            self._compiled.follow_bodies()
         self.move_to(base)
         self._take(landscape.wide_pairs(base))
 
@@ -133,7 +140,11 @@ class LocalEnergyModel:
 
     def at(self, x: FloatArray, strain: float) -> State:
         """Move along (n,) coordinates, then strain box and positions."""
-        return self.landscape.displaced(self.base, x).strained(strain)
+        shift, turn = self.landscape.motion(x)
+        if self._along_bodies and self.landscape.particles.dimension == 3:
+            axes = body_axes(self.base.orientation.astype(np.float64))
+            turn = np.einsum("nb,nbk->nk", turn, axes)
+        return self.base.displaced(shift, turn).strained(strain)
 
     def evaluate(self, x: FloatArray, strain: float, *, extended: bool) -> Evaluation:
         """Evaluate the state `at(x, strain)`, with the errors of `Landscape.evaluate`."""

@@ -16,12 +16,13 @@ from typing import NamedTuple
 import numpy as np
 
 from jamshape.contacts import find_contacts, find_rattlers
+from jamshape.measures.nonaffine import relative_motion
 from jamshape.packing import Packing
 from jamshape.records import Record
 
 OPENED, CLOSED = "opened", "closed"
 
-_RETURNED = 1e-3
+RETURNED = 1e-3
 """Largest displacement of a particle that returned, over the smallest radius."""
 
 Bond = tuple[int, int, int]
@@ -170,10 +171,6 @@ def _returns(start: At, back: At) -> bool:
     held = ~find_rattlers(start.packing, find_contacts(start.packing))
     if not held.any():
         return True
-    box = start.packing.box
-    apart = box.fractions((back.packing.position - start.packing.position)[held])
-    apart -= apart[0]
-    moved = box.vectors(apart - np.rint(apart))
-    moved -= moved.mean(axis=0)
+    moved = relative_motion(start.packing, back.packing, held)
     largest = float(np.sqrt((moved**2).sum(axis=1)).max())
-    return largest <= _RETURNED * float(start.packing.inner_radius.min())
+    return largest <= RETURNED * float(start.packing.inner_radius.min())

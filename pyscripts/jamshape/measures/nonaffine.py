@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jamshape.arrays import FloatArray, IntArray
+from jamshape.arrays import BoolArray, FloatArray, IntArray
 from jamshape.contacts.near import NearPairs, Spheres, each_once, near_pairs
 from jamshape.packing import Box, Packing, affine_change
 from jamshape.records import Record
@@ -78,6 +78,46 @@ def nonaffine_motion(first: Packing, second: Packing, neighbours: float | None =
     w = w - box.vectors(np.rint(box.fractions(w)))
     local, squared, count = _fitted(first.n, near, r, w)
     return Nonaffine(moved, squared, change + local, count, change, neighbours)
+
+
+def relative_motion(first: Packing, second: Packing, held: BoolArray) -> FloatArray:
+    """Return by how far particles moved beside a translation and the affine map of the box, to the nearest image.
+
+    Parameters
+    ----------
+    first, second : Packing
+        Two states of the same particles.
+    held : (N,) array of bool
+        Particles of the first state that count, at least one.
+
+    Returns
+    -------
+    (n, D) array of float64, [length]
+        Displacements of those, with the mean 0.
+    """
+    second = _matched(first, second)
+    box = _least_strained(first.box, second.box)
+    now, then = box.fractions(second.position - box.lo), first.box.fractions(first.position - first.box.lo)  # fmt: skip
+    apart = (now - then)[held]
+    apart -= apart[0]
+    moved = box.vectors(apart - np.rint(apart))
+    return np.asarray(moved - moved.mean(axis=0))
+
+
+def turned_tips(first: Packing, second: Packing, held: BoolArray) -> FloatArray:
+    """(n,) displacements of the tips of particles by rotation, to the nearest equal direction, [length].
+
+    The chord of the rotation of an axis, times outer minus inner radius: the largest normal displacement of the surface
+    of a rod or an ellipse, to first order in the angle.
+    """
+    second = _matched(first, second)
+    chord = np.zeros(first.n)
+    for k in range(first.dimension):
+        a, b = first.body_axes(k), second.body_axes(k)
+        own = np.minimum(*(np.sqrt(((a - sign * b) ** 2).sum(axis=1)) for sign in (1, -1)))
+        counts = (first.dimension == 2) | np.isin(first.symmetry_axis, (-1, k))
+        chord = np.maximum(chord, np.where(counts, own, 0.0))
+    return np.asarray((chord * (first.outer_radius - first.inner_radius))[held])
 
 
 def _matched(first: Packing, second: Packing) -> Packing:

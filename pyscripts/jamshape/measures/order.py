@@ -68,6 +68,14 @@ def planar_order(packing: Packing, n: int = 2) -> OrientationalOrder:
     return orientational_order(np.arctan2(directors[:, 1], directors[:, 0]), n)
 
 
+def nematic_of(packing: Packing) -> OrientationalOrder:
+    """S_2 and its direction, as LAMMPS's `compute packing` has them: 0 without directors, the direction in the plane only."""
+    if packing.dimension == 2:
+        return planar_order(packing)
+    magnitude = nematic(packing)
+    return OrientationalOrder(0.0 if math.isnan(magnitude) else magnitude, 0.0)
+
+
 def order(packing: Packing) -> dict[str, float]:
     """Orientational order as files have it: S2 and S4 in two dimensions, S2 and C4 in three."""
     if packing.dimension == 2:

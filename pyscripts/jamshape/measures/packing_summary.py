@@ -35,6 +35,14 @@ _SUMMARY = (
         "z_single",
     ),
     *("z_iso", "n_contacts", "n_bonds", "n_rattlers", "S2", "S4", "C4", "asphericity", "beta"),
+    *(
+        "target_pressure",
+        "target_phi",
+        "box_yields",
+        "stress_error",
+        "tries",
+        "bordered_eigenvalue",
+    ),
     *("residual_force", "residual_torque", "rounding_floor", "evaluations", "wall_seconds"),
 )
 

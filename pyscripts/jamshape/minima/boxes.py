@@ -10,12 +10,12 @@ holds for the strains that keep it. Independent of shape and dimension.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from jamshape.arrays import FloatArray
+from jamshape.arrays import FloatArray, LongArray
 from jamshape.checks import ArgumentError, require_stated
 from jamshape.contacts import CrossingError
 from jamshape.landscape import Landscape
@@ -26,14 +26,19 @@ from jamshape.minima.minimise import minimise
 from jamshape.minima.target import Target, TargetError, require_reachable, strain_at
 from jamshape.packing import State
 
-FIXED, ISOTROPIC, FREE = "fixed", "isotropic", "free"
+FIXED, ISOTROPIC, FREE, SHEAR = "fixed", "isotropic", "free", "xy"
 COMPONENTS = {2: ("xx", "yy", "xy"), 3: ("xx", "yy", "zz", "yz", "xz", "xy")}
 """Components of the strain of a box, by dimension."""
 
 _MOST_STEPS = 400  # of the box
 _ROUGH = 1e-6  # residual of minima on the way
-_TIGHT, _FLOORS = 1e-12, 10.0  # residual near the end, where soft modes move stresses; at least so many roundings
-_NEAR = 0.1  # relative distance of the stress to its target below which minima have the full tolerance
+_TIGHT, _FLOORS = (
+    1e-12,
+    10.0,
+)  # residual near the end, where soft modes move stresses; at least so many roundings
+_NEAR = (
+    0.1  # relative distance of the stress to its target below which minima have the full tolerance
+)
 _ACCURACY = 1e-9  # of the linear response
 _SHIFT = 1e-13  # least shift of the Hessian, in k_e / length^2, so that translations do not take up rounding
 _FALLEN = 1e-2  # fraction of the expected energy below which the packing has come apart
@@ -43,7 +48,11 @@ _REACH, _LEAST_REACH = 0.5, 1e-7  # strain in a step over that from jamming
 _SMALL_REACH = 0.02  # below which a packing that comes apart is unstable
 _SLIDING = 1e-5  # residual that sliding leaves; see `target`
 _FIRST_LEVEL = 1e-3  # of the pressure, in k_e / length^D
-_LOWER, _MOST_LIFTS, _MOST_LIFTED = 0.1, 8, 100.0  # factor to the next pressure; most times, and factor, that it is raised
+_LOWER, _MOST_LIFTS, _MOST_LIFTED = (
+    0.1,
+    8,
+    100.0,
+)  # factor to the next pressure; most times, and factor, that it is raised
 _SETTLED = 1e-2  # stress error at which it is reduced
 _ROUNDING = 1e-12  # relative, of the enthalpy
 _VOLUME = 1e-15  # relative error of the volume
@@ -80,7 +89,8 @@ def strains_of(box: str, dimension: int) -> FloatArray:
         return np.eye(dimension)[None]
     if not words or len(set(words)) < len(words) or not set(words) <= set(names):
         said = "{box:name} is " + repr(box) + ", expected isotropic, free or components such as "
-        raise ArgumentError(f"{said}{names[0]!r} or {' '.join(names)!r}", {"box": box})
+        said += f"{names[0]!r} or {' '.join(names)!r}"
+        raise ArgumentError(said, {"box": box})
     axes = [k for k in range(dimension) if "xyz"[k] * 2 in words]
     found = [np.zeros((dimension, dimension))]
     found[0][axes, axes] = 1.0
@@ -94,9 +104,13 @@ def strains_of(box: str, dimension: int) -> FloatArray:
     return np.array(found)
 
 
+class FlowError(TargetError):
+    """A packing does not resist a shear stress: its box shears without an end."""
+
+
 @dataclass(frozen=True)
 class Yielding:
-    """Goal of a minimisation in a box that yields: one of pressure, u0 and phi.
+    """Goal of a minimisation in a box that yields: one of pressure, u0 and phi, or none if the box keeps its volume.
 
     Parameters
     ----------
@@ -110,11 +124,15 @@ class Yielding:
         Largest difference of the pressure tensor to its target over the pressure, and of u over u0.
     tolerance
         Largest residual of the particles.
+    shear
+        Shear stress to resist, that is -p_xy, [energy / length^D]; has no effect if the component xy is held.
+    most_strain
+        Largest shear of the box on the way, beyond which the packing counts as flowing.
 
     Raises
     ------
     ValueError
-        If not exactly one target is given, or a number is out of its range.
+        If not one target is given, or a number is out of its range.
     """
 
     box: str = ISOTROPIC
@@ -123,11 +141,13 @@ class Yielding:
     phi: float | None = None
     accuracy: float = 1e-8
     tolerance: float = 1e-8
+    shear: float = 0.0
+    most_strain: float = math.inf
 
     def __post_init__(self) -> None:
         given = {name: getattr(self, name) for name in ("pressure", "u0", "phi")}
         given = {name: value for name, value in given.items() if value is not None}
-        if len(given) != 1:
+        if len(given) != 1 and (given or self.box != SHEAR):
             found = " and ".join(given) or "none"
             msg = f"targets are {found}, expected one of pressure, u0 and phi"
             raise ValueError(msg)
@@ -137,8 +157,14 @@ class Yielding:
     def settings(self) -> dict[str, Any]:
         """Settings as attributes of a file, where names without `target` are of measurements."""
         names = {"pressure": "target_pressure", "u0": "u0", "phi": "target_phi"}
-        told = {new: value for old, new in names.items() if (value := getattr(self, old)) is not None}
-        return told | {"box_yields": self.box, "accuracy": self.accuracy, "tolerance": self.tolerance}
+        told = {
+            new: value for old, new in names.items() if (value := getattr(self, old)) is not None
+        }
+        return told | {
+            "box_yields": self.box,
+            "accuracy": self.accuracy,
+            "tolerance": self.tolerance,
+        }
 
     @property
     def aim(self) -> str:
@@ -152,13 +178,30 @@ class Yielding:
         if self.u0 is not None:
             require_reachable(landscape, Target(self.u0))
         strains = strains_of(self.box, landscape.particles.dimension)
-        if not strains[0].any():
-            name = next(n for n in ("pressure", "u0", "phi") if getattr(self, n) is not None)
-            said = "{box} keeps the volume, which {" + name + "} needs to change, expected a component such as xx as well"
+        named = [name for name in ("pressure", "u0", "phi") if getattr(self, name) is not None]
+        if not strains[0].any() and named:
+            name = named[0]
+            said = (
+                "{box} keeps the volume, which {"
+                + name
+                + "} needs to change, expected a component such as xx as well"
+            )
             raise ArgumentError(said, {"box": self.box, name: getattr(self, name)})
 
+    @property
+    def keeps_volume(self) -> bool:
+        """Whether the volume is no unknown."""
+        return self.pressure is None and self.u0 is None
+
+    def stress(self, pressure: float, dimension: int) -> FloatArray:
+        """Return the pressure tensor (D, D) to reach at a pressure."""
+        found = pressure * np.eye(dimension)
+        found[0, 1] = found[1, 0] = -self.shear
+        return found
+
     def find(self, landscape: Landscape, start: State) -> Minimum:
-        """Lead a state to the goal; errors as `advance`."""
+        """Lead a state to the goal; errors as `advance` and `require`."""
+        self.require(landscape)
         at = Settling(start)
         while not at.done:
             advance(landscape, at, self)
@@ -180,15 +223,18 @@ class Settling:
         Largest strain of the next step, over the strain from jamming.
     closing
         Strain of the next compression of an unjammed state.
+    first
+        Pressure to reach first, where the target is smaller, [energy / length^D]; that of the start by default.
     level
-        Pressure to reach first, where the target is smaller, [energy / length^D]; falls as the stress gets there. By
-        default that of the start.
+        The present one of such pressures, which fall as the stress gets there.
     n_lifts
         Times that it was raised.
     n_steps
         Steps of the box so far.
     stress_error
         Largest difference of the stress to its target, over the pressure.
+    deformation : (D, D) array of float64
+        Of the box since the start.
     tolerance
         Residual of the particles that suffices; grows where only sliding is left.
     done
@@ -199,13 +245,26 @@ class Settling:
     present: Minimum | None = None
     reach: float = _REACH
     closing: float = _CLOSING
-    level: float | None = None
+    first: float | None = None
+    level: float = 0.0
     n_lifts: int = 0
     n_steps: int = 0
     stress_error: float = math.inf
     tolerance: float = 0.0
     done: bool = False
+    deformation: FloatArray | None = None
     history: History = field(default_factory=History)
+
+    @property
+    def sheared(self) -> float:
+        """Shear strain of the box since the start."""
+        F = self.deformation
+        return 0.0 if F is None else float(F[0, 1] / F[1, 1])
+
+    def deform(self, matrix: LongArray) -> None:
+        """Take note of a further deformation."""
+        before = np.eye(len(matrix)) if self.deformation is None else self.deformation
+        self.deformation = np.asarray(matrix, np.float64) @ before
 
 
 class _Posed(NamedTuple):
@@ -225,9 +284,16 @@ def _pressures(landscape: Landscape, at: Settling, goal: Yielding) -> tuple[floa
     """Return the mean pressure in the components that may change the volume, and the one to reach."""
     present = at.present
     assert present is not None
-    tensor, normal = landscape.stress(present.state), strains_of(goal.box, present.state.dimension)[0]
-    pressure = float((tensor * normal).sum() / normal.sum()) if normal.any() else float(np.trace(tensor) / len(tensor))
-    if goal.phi is not None:
+    tensor, normal = (
+        landscape.stress(present.state),
+        strains_of(goal.box, present.state.dimension)[0],
+    )
+    pressure = (
+        float((tensor * normal).sum() / normal.sum())
+        if normal.any()
+        else float(np.trace(tensor) / len(tensor))
+    )
+    if goal.keeps_volume:
         return pressure, pressure
     if goal.pressure is not None:
         return pressure, max(goal.pressure, at.level)
@@ -247,6 +313,8 @@ def advance(landscape: Landscape, at: Settling, goal: Yielding) -> None:
 
     Raises
     ------
+    FlowError
+        If the box shears by more than the largest strain.
     TargetError
         If the goal is not reached.
     CrossingError
@@ -255,12 +323,12 @@ def advance(landscape: Landscape, at: Settling, goal: Yielding) -> None:
     if at.present is None:
         at.tolerance = goal.tolerance
         at.present = minimise(landscape, at.state, "auto", Stop(goal.tolerance), at.history)
-        given, at.level = at.level, 0.0
-        if len(strains_of(goal.box, at.state.dimension)) > 1:
-            present = _pressures(landscape, at, goal)[0]
-            at.level = min(first_level(landscape), present) if given is None else given
+        if _changes_shape(goal, at.state):
+            is_loose = at.present.outcome is Outcome.UNJAMMED
+            present = math.inf if is_loose else _pressures(landscape, at, goal)[0]
+            at.level = min(first_level(landscape), present) if at.first is None else at.first
     elif at.n_steps >= _MOST_STEPS:
-        _give_up(landscape, at, goal)
+        _give_up(at, goal)
     elif at.reach < _LEAST_REACH:
         _lift(landscape, at, goal)
     elif not _has_volume(landscape, at.present.state, goal):
@@ -271,6 +339,9 @@ def advance(landscape: Landscape, at: Settling, goal: Yielding) -> None:
         _step(landscape, at, goal)
     at.n_steps += 1
     at.state = at.present.state
+    if abs(at.sheared) > goal.most_strain:
+        msg = f"the box sheared by {at.sheared:.3g} at a stress of {goal.shear:g}, expected at most {goal.most_strain:g}"
+        raise FlowError(msg)
     _judge(landscape, at, goal)
 
 
@@ -281,11 +352,11 @@ def _judge(landscape: Landscape, at: Settling, goal: Yielding) -> None:
     if not _has_volume(landscape, present.state, goal):
         return
     if present.outcome is Outcome.UNJAMMED:
-        at.done, at.stress_error = goal.phi is not None, 0.0
+        at.done, at.stress_error = goal.keeps_volume, 0.0
         return
     aim = _pressures(landscape, at, goal)[1]
     at.stress_error = _stress_error(landscape, present, aim, goal)
-    if goal.phi is None and at.level == aim:
+    if not goal.keeps_volume and at.level == aim:
         if at.stress_error < _SETTLED:
             at.level *= _LOWER
         return
@@ -298,8 +369,8 @@ def _judge(landscape: Landscape, at: Settling, goal: Yielding) -> None:
 
 def _stress_error(landscape: Landscape, found: Minimum, aim: float, goal: Yielding) -> float:
     """Return the largest difference of the stress to its target in the components that yield, over the pressure."""
-    strains = strains_of(goal.box, found.state.dimension)[int(goal.phi is not None) :]
-    off = landscape.stress(found.state) - aim * np.eye(found.state.dimension)
+    strains = strains_of(goal.box, found.state.dimension)[int(goal.keeps_volume) :]
+    off = landscape.stress(found.state) - goal.stress(aim, found.state.dimension)
     return float(np.abs(np.einsum("ab,kab->k", off, strains)).max(initial=0.0)) / aim
 
 
@@ -321,15 +392,23 @@ def first_level(landscape: Landscape) -> float:
     return _FIRST_LEVEL * landscape.stiffness / landscape.length**landscape.particles.dimension
 
 
+def _changes_shape(goal: Yielding, state: State) -> bool:
+    return len(strains_of(goal.box, state.dimension)) > 1
+
+
 def _lift(landscape: Landscape, at: Settling, goal: Yielding) -> None:
     """Continue at a higher pressure where contacts open and close within the smallest steps."""
     level = max(at.level, _pressures(landscape, at, goal)[1]) / _LOWER
-    if at.n_lifts == _MOST_LIFTS or goal.phi is not None or level > _MOST_LIFTED * first_level(landscape):
-        _give_up(landscape, at, goal)
+    if (
+        at.n_lifts == _MOST_LIFTS
+        or goal.keeps_volume
+        or level > _MOST_LIFTED * first_level(landscape)
+    ):
+        _give_up(at, goal)
     at.level, at.reach, at.n_lifts = level, _REACH, at.n_lifts + 1
 
 
-def _give_up(landscape: Landscape, at: Settling, goal: Yielding) -> None:
+def _give_up(at: Settling, goal: Yielding) -> None:
     assert at.present is not None
     pressure = -at.present.evaluation.strain_gradient / (at.state.dimension * at.state.volume)
     msg = (
@@ -348,7 +427,9 @@ def _change_volume(landscape: Landscape, at: Settling, goal: Yielding) -> None:
     whole = (_volume_of(landscape, goal) / present.state.volume) ** (1 / normal.sum()) - 1
     strain = float(np.clip(whole, -_LONGEST, _LONGEST))
     is_last = strain == whole
-    state = present.state.deformed(np.eye(len(normal), dtype=np.longdouble) + np.longdouble(strain) * normal)
+    state = present.state.deformed(
+        np.eye(len(normal), dtype=np.longdouble) + np.longdouble(strain) * normal
+    )
     tolerance = goal.tolerance if is_last else max(goal.tolerance, _ROUGH)
     at.present = minimise(landscape, state, "auto", Stop(tolerance), at.history)
 
@@ -357,62 +438,110 @@ def _close(landscape: Landscape, at: Settling, goal: Yielding) -> None:
     """Compress an unjammed packing."""
     assert at.present is not None
     normal = strains_of(goal.box, at.state.dimension)[0]
-    state = at.state.deformed(np.eye(len(normal), dtype=np.longdouble) - np.longdouble(at.closing) * normal)
+    state = at.state.deformed(
+        np.eye(len(normal), dtype=np.longdouble) - np.longdouble(at.closing) * normal
+    )
     at.closing, at.reach = min(2 * at.closing, _LONGEST), _REACH
     at.present = minimise(landscape, state, "auto", Stop(_ROUGH), at.history)
+
+
+class _Trial(NamedTuple):
+    """A step of the box to try."""
+
+    state: State
+    """Strained, with particles moved along."""
+    matrix: LongArray
+    """(D, D) deformation of the box."""
+    aim: float
+    """Pressure to reach."""
+    expected: float
+    """Change of the enthalpy."""
+    part: float
+    """Strain over that from jamming."""
+    is_near: bool
+    """Whether it leads to the target, not to the limit of a step."""
+    stop: Stop
 
 
 def _step(landscape: Landscape, at: Settling, goal: Yielding) -> None:
     """Take a step of the box, and accept it if the enthalpy falls."""
     present = at.present
     assert present is not None
-    state, volume = present.state, present.state.volume
-    every = strains_of(goal.box, state.dimension)
-    pressure, aim = _pressures(landscape, at, goal)
-    strains = every[1:] if goal.phi is not None else every[int(not every[0].any()) :]
-    posed = _posed(landscape, present, strains, aim)
-    from_jamming = strain_at(landscape, present.energy_density)
-    largest = min(at.reach * from_jamming, _LONGEST)
-    e = _within(posed, largest)
-    matrix = _matrix(strains, e, every[0], keeps_volume=goal.phi is not None)
-    model = LocalEnergyModel(landscape, state)
-    x = -(e @ posed.response[:-1]) - posed.response[-1]
-    moved = landscape.displaced(state, model.part_within(x) * x).deformed(matrix).with_least_tilt()
-    is_near = float(np.linalg.norm(e)) < 0.999 * largest and at.stress_error < _NEAR
-    floor = _FLOORS * rounding_floor(present.evaluation, landscape)
-    tight = at.tolerance if at.tolerance > goal.tolerance else min(goal.tolerance, max(_TIGHT, floor))
-    tolerance = tight if is_near else max(goal.tolerance, _ROUGH)
-    least = min(1.0, (aim / pressure) ** 2 if pressure > 0 else 1.0) * present.evaluation.energy
-    stop = Stop(tolerance, lowest=_FALLEN * least / volume)
+    trial = _trial(landscape, at, goal)
     try:
-        found = minimise(landscape, moved, "near", stop, at.history)
+        found = minimise(landscape, trial.state, "near", trial.stop, at.history)
     except CrossingError:
         at.reach /= 4
         return
-    if found.outcome is Outcome.UNJAMMED:  # opened too far, or, in a small step, unstable to the strain
-        if at.reach < _SMALL_REACH:
-            at.present, at.closing, at.level = found, _CLOSING, first_level(landscape)
-        else:
-            at.reach /= 4
+    if found.outcome is Outcome.UNJAMMED and at.reach >= _SMALL_REACH:  # opened too far
+        at.reach /= 4
         return
-    expected = float(posed.slope @ e + 0.5 * e @ posed.curvature @ e)
-    gained = found.evaluation.energy - present.evaluation.energy
-    gained += aim * volume * (float(np.prod(np.diagonal(matrix))) - 1)
-    noise = _ROUNDING * (present.evaluation.energy + abs(aim) * volume * float(np.abs(e).sum()))
-    settles = is_near and _stress_error(landscape, found, aim, goal) < 0.5 * at.stress_error
-    if gained > noise and not settles:
+    if found.outcome is Outcome.UNJAMMED:  # unstable to the strain
+        at.closing = _CLOSING
+        at.level = first_level(landscape) if _changes_shape(goal, found.state) else 0.0
+    elif not _is_better(landscape, (at, trial, found), goal):
         if present.residual.largest > at.tolerance:  # forces that are left make predictions wrong
-            at.present = minimise(landscape, state, "near", Stop(at.tolerance), at.history)
-            return
-        at.reach = float(np.linalg.norm(e)) / from_jamming / 4
+            stop = Stop(at.tolerance)
+            at.present = minimise(landscape, present.state, "near", stop, at.history)
+        else:
+            at.reach = trial.part / 4
         return
-    if gained < 0.5 * expected or is_near:
-        at.reach = min(2 * at.reach, _LONGEST / from_jamming)
     at.present = found
+    at.deform(trial.matrix)
 
 
-def _posed(landscape: Landscape, present: Minimum, strains: FloatArray, aim: float) -> _Posed:
-    """Set up Newton's equations for strains at a target pressure."""
+def _trial(landscape: Landscape, at: Settling, goal: Yielding) -> _Trial:
+    """Choose the next step: that of Newton, or the best one within the reach."""
+    present = at.present
+    assert present is not None
+    state = present.state
+    pressure, aim = _pressures(landscape, at, goal)
+    every = strains_of(goal.box, state.dimension)
+    stress = goal.stress(aim, state.dimension)
+    posed = _posed(landscape, present, every[int(goal.keeps_volume) :], stress)
+    from_jamming = strain_at(landscape, present.energy_density)
+    largest = min(at.reach * from_jamming, _LONGEST)
+    e = _within(posed, largest)
+    length = float(np.linalg.norm(e))
+    x = -(e @ posed.response[:-1]) - posed.response[-1]
+    x *= LocalEnergyModel(landscape, state).part_within(x)
+    matrix = _matrix(posed.strains, e, every[0], keeps_volume=goal.keeps_volume)
+    moved = landscape.displaced(state, x).deformed(matrix).with_least_tilt()
+    is_near = length < 0.999 * largest and at.stress_error < _NEAR
+    tolerance = max(goal.tolerance, _ROUGH)
+    if is_near:
+        floor = _FLOORS * rounding_floor(present.evaluation, landscape)
+        is_sliding = at.tolerance > goal.tolerance
+        tolerance = at.tolerance if is_sliding else min(goal.tolerance, max(_TIGHT, floor))
+    falls = min(1.0, (aim / pressure) ** 2) if pressure > 0 else 1.0
+    stop = Stop(tolerance, lowest=_FALLEN * falls * present.energy_density)
+    expected = float(posed.slope @ e + 0.5 * e @ posed.curvature @ e)
+    return _Trial(moved, matrix, aim, expected, length / from_jamming, is_near, stop)
+
+
+def _is_better(
+    landscape: Landscape, step: tuple[Settling, _Trial, Minimum], goal: Yielding
+) -> bool:
+    """Whether a step lowers the enthalpy or, within rounding, the error of the stress; adapts the reach."""
+    at, trial, found = step
+    present = at.present
+    assert present is not None
+    volume, grown = present.state.volume, float(np.prod(np.diagonal(trial.matrix))) - 1
+    gained = found.evaluation.energy - present.evaluation.energy
+    gained += volume * (trial.aim * grown - goal.shear * float(trial.matrix[0, 1]))
+    strain = np.abs(trial.matrix - np.eye(len(trial.matrix))).sum()
+    noise = _ROUNDING * (present.evaluation.energy + abs(trial.aim) * volume * float(strain))
+    error = _stress_error(landscape, found, trial.aim, goal)
+    settles = trial.is_near and error < 0.5 * at.stress_error
+    if gained > noise and not settles:
+        return False
+    if gained < 0.5 * trial.expected or trial.is_near:
+        at.reach = min(2 * at.reach, _LONGEST / strain_at(landscape, present.energy_density))
+    return True
+
+
+def _posed(landscape: Landscape, present: Minimum, strains: FloatArray, aim: FloatArray) -> _Posed:
+    """Set up Newton's equations for strains at a target pressure tensor."""
     state, volume = present.state, present.state.volume
     least = _SHIFT * landscape.stiffness / landscape.length**2
     shift = max(least, least_shift(landscape, present.evaluation))
@@ -422,11 +551,13 @@ def _posed(landscape: Landscape, present: Minimum, strains: FloatArray, aim: flo
     # Smaller forces are rounding, which soft modes would amplify.
     gradient = present.evaluation.gradient * (present.residual.largest > _ROUGH / 10)
     response = np.asarray(newton.solve(np.vstack([coupling, gradient]), _ACCURACY))
-    off = landscape.stress(state) - aim * np.eye(state.dimension)
+    off = landscape.stress(state) - aim
     slope = -volume * np.einsum("ab,kab->k", off, strains) - response[-1] @ coupling.T
     traces = np.trace(strains, axis1=1, axis2=2)
-    turned = np.einsum("kab,lba->kl", strains, strains)
-    curvature = own + aim * volume * (np.outer(traces, traces) - turned)
+    # Derivatives of V S F^-T, S the target, by F at F = 1.
+    along = np.einsum("ab,kab->k", aim, strains)
+    turned = np.einsum("ac,lbc,kab->kl", aim, strains, strains)
+    curvature = own + volume * (np.outer(along, traces) - turned)
     return _Posed(strains, slope, curvature - coupling @ response[:-1].T, response)
 
 
@@ -439,8 +570,10 @@ def _within(posed: _Posed, largest: float) -> FloatArray:
     def at(shift: float) -> FloatArray:
         return np.asarray(-along / np.maximum(values + shift, 1e-300))
 
-    if values[0] > 0 and np.linalg.norm(at(0.0)) <= largest:
-        return np.asarray(axes @ at(0.0))
+    if values[0] > 0:
+        whole = -np.linalg.solve(posed.curvature, posed.slope)
+        if np.linalg.norm(whole) <= largest:
+            return np.asarray(whole)
     high = low + float(np.linalg.norm(along)) / largest
     for _ in range(200):
         middle = 0.5 * (low + high)
@@ -453,8 +586,10 @@ def _within(posed: _Posed, largest: float) -> FloatArray:
 
 def _matrix(strains: FloatArray, e: FloatArray, normal: FloatArray, *, keeps_volume: bool) -> Any:
     """Return the deformation (D, D) of a strain, in long double."""
-    found = np.eye(len(normal), dtype=np.longdouble) + np.einsum("k,kab->ab", e.astype(np.longdouble), strains)
+    found = np.eye(len(normal), dtype=np.longdouble) + np.einsum(
+        "k,kab->ab", e.astype(np.longdouble), strains
+    )
     if keeps_volume:
-        scale = np.prod(np.diagonal(found)) ** (-1 / np.longdouble(normal.sum()))
+        scale = np.prod(np.diagonal(found)) ** (-1 / np.longdouble(max(normal.sum(), 1)))
         found = found @ np.diag(np.where(np.diagonal(normal) > 0, scale, 1))
     return found

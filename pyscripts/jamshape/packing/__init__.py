@@ -2,7 +2,14 @@
 
 from jamshape.packing.box import Box, Lengths, affine_change, cuboid_around
 from jamshape.packing.packing import Packing
-from jamshape.packing.rotation import UNIT_QUATERNION_TOLERANCE, angle_from_quaternion, body_axes
+from jamshape.packing.rotation import (
+    UNIT_QUATERNION_TOLERANCE,
+    angle_from_quaternion,
+    body_axes,
+    rate_of_vector,
+    spin_of_vector,
+    turned,
+)
 from jamshape.packing.state import State
 
 __all__ = [
@@ -15,4 +22,7 @@ __all__ = [
     "angle_from_quaternion",
     "body_axes",
     "cuboid_around",
+    "rate_of_vector",
+    "spin_of_vector",
+    "turned",
 ]

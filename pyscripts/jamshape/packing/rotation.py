@@ -84,3 +84,42 @@ def product(p: ArrayLike, q: ArrayLike) -> NDArray[Any]:
         pw * qj - pi * qk + pj * qw + pk * qi,
         pw * qk + pi * qj - pj * qi + pk * qw,
     ])  # fmt: skip
+
+
+def turned(quaternion: NDArray[Any], vector: NDArray[Any]) -> NDArray[Any]:
+    """Rotate (N, 4) quaternions by (N, 3) rotation vectors, in space coordinates."""
+    angle = np.sqrt((vector**2).sum(axis=1, keepdims=True))
+    axis = vector / np.where(angle > 0, angle, 1)
+    half = np.concatenate([np.cos(angle / 2), np.sin(angle / 2) * axis], axis=1)
+    found = product(half, quaternion)
+    unit: NDArray[Any] = found / np.sqrt((found**2).sum(axis=1, keepdims=True))
+    return unit
+
+
+def spin_of_vector(vector: FloatArray, rate: FloatArray) -> FloatArray:
+    """(N, 3) angular velocities in space at (N, 3) rotation vectors that change at (N, 3) rates.
+
+    The left Jacobian of SO(3). About body axes it is the right one: that of -vector.
+    """
+    angle = np.linalg.norm(vector, axis=1, keepdims=True)
+    once = np.cross(vector, rate)
+    first = 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
+    # Near zero the closed form loses all digits to cancellation; its series does not.
+    is_small = angle < 1e-2
+    safe = np.where(is_small, 1.0, angle)
+    second = np.where(is_small, 1 / 6 - angle**2 / 120, (safe - np.sin(safe)) / safe**3)
+    found: FloatArray = rate + first * once + second * np.cross(vector, once)
+    return found
+
+
+def rate_of_vector(vector: FloatArray, spin: FloatArray) -> FloatArray:
+    """(N, 3) rates of change of (N, 3) rotation vectors shorter than 2 pi; the inverse of `spin_of_vector`."""
+    angle = np.linalg.norm(vector, axis=1, keepdims=True)
+    once = np.cross(vector, spin)
+    is_small = angle < 1e-2
+    safe = np.where(is_small, 1.0, angle)
+    second = np.where(
+        is_small, 1 / 12 + angle**2 / 720, (1 - 0.5 * safe / np.tan(0.5 * safe)) / safe**2
+    )
+    found: FloatArray = spin - 0.5 * once + second * np.cross(vector, once)
+    return found

@@ -10,7 +10,7 @@ import numpy as np
 
 from jamshape.arrays import FloatArray, LongArray
 from jamshape.packing.packing import Packing
-from jamshape.packing.rotation import product
+from jamshape.packing.rotation import turned
 from jamshape.records import Record
 
 _TURN = 2 * np.arccos(np.longdouble(-1))
@@ -94,7 +94,7 @@ class State(Record):
             orientation = self.orientation + turn
             orientation = orientation - _TURN * np.rint(orientation / _TURN)
         else:
-            orientation = _turned(self.orientation, np.asarray(turn, np.longdouble))
+            orientation = turned(self.orientation, np.asarray(turn, np.longdouble))
         return replace(self, position=self.position + shift, orientation=orientation)
 
     def packing(self, like: Packing) -> Packing:
@@ -107,13 +107,3 @@ def _split(values: LongArray) -> FloatArray:
     """(2, ...) doubles and their low parts."""
     double = values.astype(np.float64)
     return np.stack([double, (values - double).astype(np.float64)])
-
-
-def _turned(quaternion: LongArray, vector: LongArray) -> LongArray:
-    """Rotate (N, 4) quaternions by (N, 3) rotation vectors, in space coordinates."""
-    angle = np.sqrt((vector**2).sum(axis=1, keepdims=True))
-    axis = vector / np.where(angle > 0, angle, 1)
-    half = np.concatenate([np.cos(angle / 2), np.sin(angle / 2) * axis], axis=1)
-    turned = product(half, quaternion)
-    unit: LongArray = turned / np.sqrt((turned**2).sum(axis=1, keepdims=True))
-    return unit

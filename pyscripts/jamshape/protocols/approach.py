@@ -33,6 +33,8 @@ _KAPPA_FAST, _DT_FAST = 1e-4, 0.2
 # Largest number of time steps: days for small packings. Slower rates need implicit steps.
 MOST_STEPS = 1_000_000_000
 
+_ROUNDING = 1e-9  # relative, of a packing fraction
+
 _NO_END = 1e3  # a packing fraction that is never reached
 
 # Time steps stay below this fraction of the stable one; denser states allow less.
@@ -98,7 +100,9 @@ class ApproachError(RuntimeError):
 
 
 def compressed_start(start: Packing, phi: float) -> Packing:
-    """Compress a random packing fast, in LAMMPS, to the start of slow compressions."""
+    """Compress a random packing fast, in LAMMPS, to the start of slow flows, unless it is that dense already."""
+    if start.phi >= phi * (1 - _ROUNDING):
+        return start
     with Session() as session:
         fast = Compression(kappa=_KAPPA_FAST, phi_end=phi, dt=_DT_FAST, sides=2)
         # Whole steps that end exactly at phi.

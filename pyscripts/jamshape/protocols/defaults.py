@@ -18,7 +18,7 @@ from jamshape.checks import (
 )
 from jamshape.files.vocabulary import ATHERMAL, COMPRESSED, THERMAL, protocol_named
 from jamshape.minima import METHODS
-from jamshape.minima.boxes import FIXED, ISOTROPIC, Yielding
+from jamshape.minima.boxes import FIXED, FREE, ISOTROPIC, Yielding
 from jamshape.minima.target import Target
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.quasistatic import Quasistatic
@@ -46,7 +46,9 @@ _ROUGH = 1e-2  # residual that suffices before the search for an energy
 # Energy tolerance over the squared step, [energy]: a step adds ten to a hundred times as much to a jammed packing.
 _LOOSE = 2.5e-3
 
-_IN_BETWEEN = 1e-8  # energy density near which compression hands over, where the target is not an energy
+_IN_BETWEEN = (
+    1e-8  # energy density near which compression hands over, where the target is not an energy
+)
 
 _LAMBDA = 1e-6  # initial one of bisection (Marschall & Teitel 2018, Sec. III C)
 
@@ -172,7 +174,7 @@ def recipe_for(
         One of `PROTOCOLS`, "quasistatic" by default; 1 and 2 are those of Yuan et al. 2019.
     **given
         Settings of `PROTOCOLS` by name, None for defaults; `strict`, whether to continue to a minimum without
-        negative eigenvalues; and `pressure`, `phi` and `box` of `Yielding`.
+        negative eigenvalues; `pressure`, `phi` and `box` of `Yielding`; and `stable_to_shear`.
 
     Returns
     -------
@@ -192,8 +194,9 @@ def recipe_for(
     >>> recipe_for(Particles.of(alpha=4.0), protocol="marschall-2018").n
     1024
     """
-    strict = bool(given.pop("strict", None))
+    strict, stable = (bool(given.pop(name, None)) for name in ("strict", "stable_to_shear"))
     other = {name: given.pop(name, None) for name in ("pressure", "phi", "box")}
+    other["box"] = FREE if stable and other["box"] is None else other["box"]
     source = None if given.get("start") is None else Source.read(Path(given["start"]))
     if source is not None:
         source.require(particles, n=given.get("n"), dimension=dimension, seed=seed)
@@ -210,10 +213,8 @@ def recipe_for(
     if source is not None:
         get |= _of_source(source, given)
     how, target = usual.compose(get)
-    if isinstance(aim, Yielding):
-        target = aim
     numbers = (get["n"], dimension, 1 if seed is None else seed, get["phi_start"])
-    return Recipe(particles, *numbers, how, target, strict=strict)
+    return Recipe(particles, *numbers, how, aim or target, strict=strict, stable_to_shear=stable)
 
 
 def aim_of(

@@ -8,19 +8,22 @@ import math
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from jamshape.command import plain
 from jamshape.files.checkpoint import Checkpoint
 from jamshape.files.h5md import read_attributes
 from jamshape.files.outcomes import is_reached, shortfall
 from jamshape.minima import Outcome
 from jamshape.packing import Packing
+from jamshape.protocols.defaults import recipe_for
 from jamshape.protocols.make import is_done, made, make, require_same
 from jamshape.protocols.recipe import Recipe
 from jamshape.recording.driver import Plan, Row, Told
-from jamshape.recording.workers import Workers
+from jamshape.recording.workers import Workers, cores
+from jamshape.shapes.particles import Particles
 
 ENSEMBLE = "ensemble"
 """Kind of the files of ensembles."""
@@ -71,7 +74,47 @@ def file_of(folder: Path, recipe: Recipe) -> Path:
     return folder / f"{stem}_seed{recipe.seed}.h5"
 
 
-def plan(recipe: Recipe, seeds: Sequence[int], jobs: int, folder: Path | None) -> Plan:
+class Means(NamedTuple):
+    """Processes and folder of an ensemble, on which its results do not depend."""
+
+    jobs: int
+    """Number of processes."""
+    folder: Path | None = None
+    """Folder for the packings."""
+    arguments: str = ""
+    """Arguments of `recipe_for` as JSON; empty if particles are not described by them."""
+
+    @classmethod
+    def of(
+        cls,
+        jobs: int,
+        folder: Path | None,
+        particles: Particles | None,
+        settings: Mapping[str, Any],
+    ) -> Means:
+        """Describe the arguments of a recipe, so that its file is enough to go on."""
+        given = dict(settings)
+        if particles is not None:
+            again = Particles.again(particles.shape.name, particles.told)
+            if again != particles:
+                return cls(jobs, folder)
+            given["particles"] = {"shape": particles.shape.name, **particles.told}
+        return cls(jobs, folder, json.dumps(plain(given)))
+
+
+def plan_again(stored: Mapping[str, Any]) -> Plan | None:
+    """Plan the ensemble of a file from its attributes; None if they do not describe it."""
+    if not (arguments := str(stored.get("arguments", ""))):
+        return None
+    given, folder = json.loads(arguments), str(stored["folder"])
+    if known := given.pop("particles", None):
+        given["particles"] = Particles.again(known.pop("shape"), known)
+    seeds = [int(seed) for seed in stored["ensemble_seeds"]]
+    recipe = recipe_for(seed=seeds[0], **given)
+    return plan(recipe, seeds, Means(cores(), Path(folder) if folder else None, arguments))
+
+
+def plan(recipe: Recipe, seeds: Sequence[int], means: Means) -> Plan:
     """Plan an ensemble.
 
     Parameters
@@ -79,19 +122,16 @@ def plan(recipe: Recipe, seeds: Sequence[int], jobs: int, folder: Path | None) -
     recipe : Recipe
         All settings, with any seed.
     seeds : sequence of int
-    jobs : int
-        Number of processes, on which results do not depend.
-    folder : Path, optional
-        Folder for the packings.
+    means : Means
     """
     own = {name: value for name, value in recipe.attributes().items() if name != "seed"}
     samples = [dataclasses.replace(recipe, seed=seed) for seed in seeds]
 
     def begin() -> EnsembleDriver:
-        return EnsembleDriver(samples[0].start(), samples, jobs, folder, {})
+        return EnsembleDriver(samples[0].start(), samples, means, {})
 
     def restore(first: Packing, checkpoint: Checkpoint) -> EnsembleDriver:
-        return EnsembleDriver(first, samples, jobs, folder, checkpoint)
+        return EnsembleDriver(first, samples, means, checkpoint)
 
     seeds_as_array = np.array(list(seeds), np.int64)
     return Plan(
@@ -112,8 +152,7 @@ class EnsembleDriver:
     first : Packing
         Random start of the first sample, which stands for the particles.
     samples : sequence of Recipe
-    jobs, folder
-        As in `plan`.
+    means : Means
     checkpoint : Checkpoint
         Number of rows, samples that ended before earlier ones, and reasons of failures; empty at the start.
     """
@@ -124,19 +163,19 @@ class EnsembleDriver:
         self,
         first: Packing,
         samples: Sequence[Recipe],
-        jobs: int,
-        folder: Path | None,
+        means: Means,
         checkpoint: Checkpoint,
     ) -> None:
-        self._first, self._samples = first, samples
+        self._first, self._samples, self._means = first, samples, means
         self._n_rows = int(checkpoint.get("n_rows", 0))
         self._ended: dict[int, Sample] = {
             int(k): dict(s) for k, s in checkpoint.get("ended", {}).items()
         }
         self._failures: dict[str, str] = json.loads(checkpoint.get("failures", "{}"))
         self._left = [k for k in range(self._n_rows, len(samples)) if k not in self._ended]
+        folder = means.folder
         tasks = [(samples[k], folder and file_of(folder, samples[k])) for k in self._left]
-        self._workers = Workers(_SAMPLE, tasks, jobs)
+        self._workers = Workers(_SAMPLE, tasks, means.jobs)
 
     @property
     def done(self) -> bool:
@@ -176,8 +215,10 @@ class EnsembleDriver:
         return {"n_rows": self._n_rows, "ended": ended, "failures": json.dumps(self._failures)}
 
     def results(self) -> Mapping[str, Any]:
-        """Return the reasons of failures, and names of outcomes."""
-        return {"failures": json.dumps(self._failures), "outcomes": " ".join(OUTCOMES)}
+        """Return the reasons of failures, names of outcomes, and what resumes the file alone."""
+        known = {"failures": json.dumps(self._failures), "outcomes": " ".join(OUTCOMES)}
+        means = self._means
+        return known | {"arguments": means.arguments, "folder": str(means.folder or "")}
 
     def close(self) -> None:
         """End the processes."""

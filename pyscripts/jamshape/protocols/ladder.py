@@ -18,27 +18,29 @@ from jamshape.contacts import Contacts
 from jamshape.files.checkpoint import Checkpoint
 from jamshape.landscape import Landscape, State
 from jamshape.minima import Minimum, Outcome, Stop, minimise, residual_of
-from jamshape.minima.target import Search, Target, TargetError, extrapolation, require_reachable
+from jamshape.minima.boxes import ISOTROPIC, Yielding
+from jamshape.minima.target import Search, Target, TargetError, extrapolation
 from jamshape.packing import Packing
+from jamshape.protocols.recipe import Aim
 from jamshape.protocols.retry import Retry, go_on
 from jamshape.recording.driver import Plan, Row, Told
 
 _FALLEN = 1e-2  # fraction of u0 below which the box was opened too far
 _EVALUATIONS = 2000  # limit of a minimisation after opening
 
-PARAMETERS = ("u0",)
+PARAMETERS = ("u0", "pressure")
 """Control parameters of a ladder."""
 
 
-def bring(landscape: Landscape, state: State, goal: Target) -> Minimum:
-    """Bring a packing to another energy density, at equal particles.
+def bring(landscape: Landscape, state: State, goal: Aim) -> Minimum:
+    """Bring a packing to another energy density or pressure, at equal particles.
 
     Parameters
     ----------
     landscape : Landscape
     state : State
         A minimum, or a state near one.
-    goal : Target
+    goal : Target or Yielding
 
     Returns
     -------
@@ -48,10 +50,12 @@ def bring(landscape: Landscape, state: State, goal: Target) -> Minimum:
     Raises
     ------
     TargetError
-        If no minimum of that energy was found.
+        If no such minimum was found.
     ValueError
-        If the energy is out of reach.
+        If the goal is out of reach.
     """
+    if isinstance(goal, Yielding):
+        return goal.find(landscape, state)
     before = landscape.evaluations
     search = Search(_opened(landscape, state, goal), goal.step)
     for _ in extrapolation(landscape, search, goal):
@@ -94,28 +98,36 @@ class Ladder:
         Largest relative difference to them.
     tolerance
         Largest net force and torque of a particle over the mean bond force.
+    box
+        How the box yields, see `Yielding`.
     """
 
     parameter: str
     values: tuple[float, ...]
     accuracy: float
     tolerance: float
+    box: str = ISOTROPIC
 
     @classmethod
     def of(cls, stored: Mapping[str, Any]) -> Ladder:
         """Read settings from the attributes of a file."""
         values = tuple(np.ravel(stored["ladder_values"]).tolist())
-        return cls(stored["ladder_parameter"], values, stored["accuracy"], stored["tolerance"])
+        numbers = stored["accuracy"], stored["tolerance"], stored.get("box_yields", ISOTROPIC)
+        return cls(stored["ladder_parameter"], values, *numbers)
 
     @property
     def settings(self) -> dict[str, Any]:
         """Settings as attributes."""
         own = {"ladder_parameter": self.parameter, "ladder_values": np.array(self.values)}
-        return own | {"accuracy": self.accuracy, "tolerance": self.tolerance}
+        box = {} if self.box == ISOTROPIC else {"box_yields": self.box}
+        return own | {"accuracy": self.accuracy, "tolerance": self.tolerance} | box
 
-    def to(self, value: float) -> Target:
+    def to(self, value: float) -> Aim:
         """Return the goal at a value."""
-        return Target(value, self.accuracy, self.tolerance)
+        if self.parameter == "u0" and self.box == ISOTROPIC:
+            return Target(value, self.accuracy, self.tolerance)
+        numbers = {self.parameter: value, "accuracy": self.accuracy, "tolerance": self.tolerance}
+        return Yielding(self.box, **numbers)
 
     def require_reachable(self, landscape: Landscape) -> None:
         """Refuse values out of reach, before any is tried.
@@ -125,7 +137,7 @@ class Ladder:
         ValueError
         """
         for value in self.values:
-            require_reachable(landscape, self.to(value))
+            self.to(value).require(landscape)
 
 
 def plan(start: Callable[[], Packing], how: Ladder, made_from: Mapping[str, Any]) -> Plan:

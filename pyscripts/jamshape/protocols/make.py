@@ -30,8 +30,8 @@ from jamshape.landscape import Landscape
 from jamshape.measures.onset import OnsetFit, fit_onset
 from jamshape.measures.packing_summary import summary_of, with_results, write_minimum
 from jamshape.minima import History, Minimum, Outcome
-from jamshape.minima.checkpoints import minimum_of, told_minimum
 from jamshape.minima.boxes import Yielding
+from jamshape.minima.checkpoints import minimum_of, told_minimum
 from jamshape.minima.target import FixedBox
 from jamshape.packing import Packing, State
 from jamshape.protocols import approach

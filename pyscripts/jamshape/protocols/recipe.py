@@ -14,7 +14,7 @@ from jamshape.arrays import FloatArray
 from jamshape.checks import ArgumentError, require_one_of, require_rising, require_stated
 from jamshape.files.h5md import read_packing
 from jamshape.files.vocabulary import ATHERMAL, COMPRESSED, MINIMISED, THERMAL
-from jamshape.minima.boxes import Yielding
+from jamshape.minima.boxes import FREE, Yielding
 from jamshape.minima.target import FixedBox, Target, bisection, extrapolation
 from jamshape.packing import Packing
 from jamshape.protocols.approach import Approach
@@ -293,6 +293,8 @@ class Recipe:
         as it is.
     strict
         Whether to continue, at that energy, to a minimum without negative eigenvalues (`protocols.strict`).
+    stable_to_shear
+        Whether to continue, in a free box, until no motion of particles and box lowers the enthalpy.
 
     Raises
     ------
@@ -316,6 +318,7 @@ class Recipe:
     way: Way = field(default_factory=Dynamics)
     target: Aim | None = field(default_factory=Target)
     strict: bool = False
+    stable_to_shear: bool = False
 
     def __post_init__(self) -> None:
         require_stated(n=self.n, seed=self.seed, phi_start=self.phi_start)
@@ -325,6 +328,9 @@ class Recipe:
             raise ArgumentError(said, {"u0": 0})
         if isinstance(self.goal, Yielding):
             self._require_yielding(self.goal)
+        elif self.stable_to_shear:
+            said = "{stable_to_shear} needs a free box, expected {box:name} free, or none of both"
+            raise ArgumentError(said, {"stable_to_shear": True, "box": None})
         self.way.require(self)
 
     def _require_yielding(self, goal: Yielding) -> None:
@@ -333,8 +339,13 @@ class Recipe:
             said = "{strict} works at a given energy or box, found {box}; leave one of them out"
             raise ArgumentError(said, {"strict": True, "box": goal.box})
         if self.way.search != "extrapolation":
-            said = "{search} finds an energy in an isotropic box, found {box}; leave one of them out"
+            said = (
+                "{search} finds an energy in an isotropic box, found {box}; leave one of them out"
+            )
             raise ArgumentError(said, {"search": self.way.search, "box": goal.box})
+        if self.stable_to_shear and goal.box != FREE:
+            said = "{stable_to_shear} needs a box that is free, found {box}; leave one of them out"
+            raise ArgumentError(said, {"stable_to_shear": True, "box": goal.box})
 
     def start(self) -> Packing:
         """Make the random start; errors as in `random_start.random_packing`."""
@@ -353,6 +364,7 @@ class Recipe:
     def attributes(self) -> dict[str, Any]:
         """Return its identifying attributes."""
         strict = {"strict": True} if self.strict else {}
+        strict |= {"stable_to_shear": True} if self.stable_to_shear else {}
         return self.before_target() | (self.target.settings if self.target else {}) | strict
 
     def before_target(self) -> dict[str, Any]:

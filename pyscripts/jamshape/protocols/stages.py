@@ -10,6 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+import numpy as np
+
 from jamshape.files.checkpoint import Checkpoint
 from jamshape.landscape import Landscape
 from jamshape.minima import History, Minimum, Outcome, Stop, boxes, minimise
@@ -30,12 +32,16 @@ from jamshape.protocols.retry import Retry
 from jamshape.protocols.strict import StrictSearch
 from jamshape.protocols.thermal import Thermal, without_overlaps
 from jamshape.recording.driver import Told
+from jamshape.vibration.stability import stability_of
 
 MOST_MINIMISATIONS = 20_000
 """Limit of a search: with the steps of 1e-6 of bisection they change phi by 0.04."""
 
 EVALUATIONS = 5000
 """Evaluations of a minimisation between two marks."""
+
+_MOST_TRIES = 20  # packings at the target before one is taken that is not stable to shear
+_OFF_SADDLE = 0.3  # step off a saddle, over the mean overlap
 
 _ADVANCES = {"extrapolation": extrapolate, "bisection": bisect}
 
@@ -255,16 +261,25 @@ def _where(search: Search, target: Target, last: float) -> str:
 
 
 class Settling:
-    """Search for a target in a box that yields."""
+    """Search for a target in a box that yields, and for stability to shear if asked.
+
+    Minimisers can end at saddles of the enthalpy. From there the packing is moved along the direction in which the enthalpy
+    falls, and settles again: a further try.
+    """
 
     def __init__(self, making: Making, checkpoint: Checkpoint | None) -> None:
         self._making, self._before = making, making.landscape.evaluations
+        self._tries, self._softest = 1, (math.nan, math.nan)
         if checkpoint is None:
             self._goal.require(making.landscape)
-            level = None if isinstance(making.recipe.way, Given) else boxes.first_level(making.landscape)
-            self._at = boxes.Settling(making.state, level=level)
+            level = (
+                None
+                if isinstance(making.recipe.way, Given)
+                else boxes.first_level(making.landscape)
+            )
+            self._at = boxes.Settling(making.state, first=level)
         else:
-            self._before = checkpoint.pop("before")
+            self._before, self._tries = checkpoint.pop("before"), checkpoint.pop("tries")
             history = History.of(checkpoint.pop("history"))
             present = minimum_of(checkpoint.pop("present", None), history)
             self._at = boxes.Settling(**checkpoint, present=present, history=history)
@@ -277,22 +292,52 @@ class Settling:
 
     @property
     def done(self) -> bool:
-        """Whether the goal is reached."""
-        return self._at.done
+        """Whether the goal is reached, by a packing that is stable if asked, or the tries are over."""
+        if not self._at.done or not self._making.recipe.stable_to_shear:
+            return self._at.done
+        value, bound = self._softest
+        return value >= -bound or (value < 0 and self._tries >= _MOST_TRIES)
 
     def advance(self) -> Told:
-        """Minimise once."""
+        """Minimise once, or judge a packing at the target."""
         at, making = self._at, self._making
-        boxes.advance(making.landscape, at, self._goal)
+        if at.done:
+            self._judge()
+        else:
+            boxes.advance(making.landscape, at, self._goal)
         u, residual = at.history.energy_density[-1], at.history.residual[-1]
         text = f"u {u:.2e}, stress off by {at.stress_error:.1e}, residual {residual:.1e}, step {at.n_steps} of the box"
         return making.told(f"box yields to {self._goal.aim}", text, at.state)
+
+    def _judge(self) -> None:
+        """Find the softest motion of particles and box, and move along it if the enthalpy falls."""
+        at, landscape = self._at, self._making.landscape
+        found = stability_of(landscape, at.state)
+        self._softest = found.eigenvalue
+        if found.sign >= 0 or self._tries >= _MOST_TRIES:
+            return
+        assert at.present is not None
+        overlap = (
+            2
+            * at.present.evaluation.energy
+            / at.present.evaluation.bond_force
+            / at.present.evaluation.n_bonds
+        )
+        size = _OFF_SADDLE * overlap / max(np.abs(found.motion).max(), 1e-300)
+        matrix = (
+            np.eye(at.state.dimension, dtype=np.longdouble) + np.longdouble(size) * found.strain
+        )
+        moved = (
+            landscape.displaced(at.state, size * found.motion).deformed(matrix).with_least_tilt()
+        )
+        self._at = boxes.Settling(moved, history=at.history)
+        self._tries += 1
 
     def checkpoint(self) -> Checkpoint:
         """Return the state of the box and its minimum."""
         at = self._at
         minimum = {"present": told_minimum(at.present), "history": at.history.told()}
-        return vars(at) | minimum | {"before": self._before}
+        return vars(at) | minimum | {"before": self._before, "tries": self._tries}
 
     def end(self) -> None:
         """Hand on the packing."""
@@ -303,6 +348,10 @@ class Settling:
             "box_steps": self._at.n_steps,
             "box_evaluations": making.landscape.evaluations - self._before,
         }
+        if making.recipe.stable_to_shear:
+            value, bound = self._softest
+            told = {"tries": self._tries, "bordered_eigenvalue": value}
+            making.attributes |= told | {"bordered_eigenvalue_bound": bound}
 
 
 class Minimising:

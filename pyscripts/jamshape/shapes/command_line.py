@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from typing import Any
 
 from jamshape.shapes.particles import Kind, Particles, parse_kind
 from jamshape.shapes.shape import Parameter, Shape
@@ -29,11 +30,17 @@ def add_particle_options(parser: ArgumentParser) -> None:
     )
 
 
-def add_meaning_options(parser: ArgumentParser) -> None:
-    """Add --dimension and --shape, for files that do not state them."""
+_MEANING: dict[str, dict[str, Any]] = {
+    "dimension": {"type": int, "choices": (2, 3), "help": "dimension of the file"},
+    "shape": {"choices": SHAPES, "help": "shape of its particles"},
+}
+
+
+def add_meaning_options(parser: ArgumentParser, *names: str) -> None:
+    """Add --dimension and --shape, or those of these names, for files that do not state them."""
     group = parser.add_argument_group("LAMMPS's data files and dumps without dimension and shape")
-    group.add_argument("--dimension", type=int, choices=(2, 3), help="dimension of the file")
-    group.add_argument("--shape", choices=SHAPES, help="shape of its particles")
+    for name in names or _MEANING:
+        group.add_argument(f"--{name}", **_MEANING[name])
 
 
 def particles_of(options: Namespace) -> Particles:

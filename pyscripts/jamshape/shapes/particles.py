@@ -165,6 +165,16 @@ class Particles:
         sizes = Sizes(d, p, kinds.astype(np.int64))
         return cls(its, _Given(sizes), {"kinds": "given one by one"})
 
+    @classmethod
+    def again(cls, shape: str, told: Mapping[str, Any]) -> Particles | None:
+        """Make particles from their `told`; None if it does not describe them, as of those given one by one."""
+        own = [parameter.name for parameter in shape_named(shape).parameters]
+        if "kinds" not in told:
+            parameters = {name: told[name] for name in own if name in told}
+            return cls.of(shape, told.get("size_ratio"), **parameters)
+        kinds = [text for text in str(told["kinds"]).split("; ") if "=" in text]
+        return cls.mixture(shape, [parse_kind(text) for text in kinds]) if kinds else None
+
     def sample(self, n: int, rng: np.random.Generator) -> Sizes:
         """Draw n particles.
 
@@ -208,7 +218,9 @@ def parse_kind(text: str) -> Kind:
 
 def _text(kind: Kind) -> str:
     own = {"size": kind.size, "share": kind.share, "spread": kind.spread}
-    return ",".join(f"{name}={value!r}" for name, value in (dict(kind.parameters) | own).items())
+    return ",".join(
+        f"{name}={float(value)!r}" for name, value in (dict(kind.parameters) | own).items()
+    )
 
 
 def _with_defaults(shape: Shape, parameters: Mapping[str, float]) -> dict[str, float]:

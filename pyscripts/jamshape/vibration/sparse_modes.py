@@ -109,6 +109,11 @@ def typical_prestress(matrix: DynamicalMatrix) -> float:
     return max(typical, 1e-15 * _stiffest(matrix))
 
 
+def below_sliding(matrix: DynamicalMatrix) -> float:
+    """Shift slightly below zero, of the size of the eigenvalues of sliding modes."""
+    return _BELOW * typical_prestress(matrix) ** 2 / _stiffest(matrix)
+
+
 def _stiffest(matrix: DynamicalMatrix) -> float:
     return float((matrix.compatibility.data**2).max(initial=0.0)) or 1.0
 
@@ -137,7 +142,7 @@ def lowest(matrix: DynamicalMatrix, k: int) -> Spectrum:
     began, known = time.perf_counter(), matrix.translations
     if _is_most(matrix, k):
         return _nearest(matrix, k, 0.0)
-    shift = _BELOW * typical_prestress(matrix) ** 2 / _stiffest(matrix)
+    shift = below_sliding(matrix)
     found: list[Spectrum] = []
     for climb in range(_CLIMBS):
         missing = k - sum(len(part.eigenvalues) for part in found)

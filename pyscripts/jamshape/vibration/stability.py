@@ -24,12 +24,16 @@ import scipy.sparse
 from jamshape.arrays import FloatArray
 from jamshape.landscape import Landscape, State
 from jamshape.vibration.hessian import DynamicalMatrix, DynamicalMatrixOptions, dynamical_matrix
-from jamshape.vibration.sparse_modes import lowest, near
+from jamshape.vibration.sparse_modes import ShiftedInverse, below_sliding, lowest, near
 from jamshape.vibration.spectrum import Spectrum, spectrum
 from jamshape.vibration.tensors import pressure_terms, strains_of
 
-# Number of modes that are sought at each of two shifts.
-_FEW = 4
+# Number of modes that are sought next to zero.
+_FEW = 2
+
+# The shift below zero is this many times a lower bound of all eigenvalues, with a multiple of known ones if M has negative ones.
+_MARGIN = 1.01
+_BEYOND = 4.0
 
 # Up to this number of coordinates the whole spectrum is found instead.
 _DENSE = 32
@@ -73,10 +77,13 @@ class BorderedMatrix(DynamicalMatrix):
         Scale of the strains, [length].
     rounding : (n + d, n + d) scipy.sparse CSR matrix
         Bound of the error of its prestress by rounding of overlaps.
+    inner : DynamicalMatrix
+        M of the fixed box.
     """
 
     length: float
     rounding: Any
+    inner: DynamicalMatrix
 
     @classmethod
     def of(cls, matrix: DynamicalMatrix) -> BorderedMatrix:
@@ -106,7 +113,7 @@ class BorderedMatrix(DynamicalMatrix):
         known["prestress_sizes"] = bordered(matrix.prestress_sizes, sizes.pushed, size)
         known["gradient"] = np.append(matrix.gradient, np.zeros(len(strains)))
         rounding = bordered(matrix.prestress_rounding, lost.pushed, of_overlaps)
-        return cls(**known, length=length, rounding=rounding)
+        return cls(**known, length=length, rounding=rounding, inner=matrix)
 
     @property
     def size(self) -> int:
@@ -136,14 +143,31 @@ class Softest(NamedTuple):
 def softest_of(matrix: BorderedMatrix) -> Softest:
     """Find the smallest eigenvalue without translations.
 
-    It is sought next to a lower bound of all eigenvalues, and next to zero, where smaller ones are resolved.
+    It is sought next to zero and, if some are further below, next to a lower bound of all. Where M itself has such
+    eigenvalues, the bound is an estimate.
     """
     if matrix.size <= _DENSE:
-        found = [spectrum(matrix)]
-    else:
-        below = -float(abs(matrix.prestress).sum(axis=1).max())
-        found = [near(matrix, _FEW, below), lowest(matrix, _FEW)]
-    return min((_lowest_of(part) for part in found), key=lambda one: one.eigenvalue.value)
+        return _lowest_of(spectrum(matrix))
+    found = [_lowest_of(lowest(matrix, _FEW))]
+    if (least := _least(matrix)) < 0:
+        least += _BEYOND * min(0.0, found[0].eigenvalue.value)
+        found.append(_lowest_of(near(matrix, 1, _MARGIN * least)))
+    return min(found, key=lambda one: one.eigenvalue.value)
+
+
+def _least(matrix: BorderedMatrix) -> float:
+    """Lower bound of all eigenvalues, if M has none below a shift next to zero; 0 if no other one is below it.
+
+    With Q = V B - shift - X^T (M - shift)^-1 X, v.(H - shift) v >= e.Q e for any v = (x, e).
+    """
+    inner, shift = matrix.inner, below_sliding(matrix.inner)
+    s, T = matrix.compatibility[:, inner.size :].toarray(), inner.translations
+    S = matrix.prestress[:, inner.size :].toarray()
+    X = inner.compatibility.T @ s - S[: inner.size]
+    X = X - T @ (T.T @ X)
+    Q = s.T @ s - S[inner.size :] - X.T @ ShiftedInverse(inner, shift).solve(X).v
+    own = float(np.linalg.eigvalsh(0.5 * (Q + Q.T))[0]) - shift
+    return min(0.0, own + shift) if own < 0 else 0.0
 
 
 def stability_of(

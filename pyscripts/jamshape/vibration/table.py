@@ -4,6 +4,7 @@
 
     /modes          eigenvalues, omega, sign, solver_error, entry_error, overlap_error, state_error, is_translation, participation, parallel, perpendicular, rotation, of_round (k,); band (k,), see `BANDS`;
     vectors (n, k) if requested
+    /particles/all  the packing, beside vectors: see `jamshape.files.h5md`
     /coordinates    particle, kind (n,), direction (n, D + T): see `jamshape.vibration.hessian.Coordinates`
     /singular_values
     /parameters     +every scalar result, and attributes of the packing and the method: for each modulus, and for the
@@ -25,9 +26,10 @@ from jamshape.checks import require_one_of
 from jamshape.files import hdf5
 from jamshape.files.disk import PathLike
 from jamshape.files.hdf5 import FileFormatError
-from jamshape.files.layout import version
+from jamshape.files.layout import read_frame, version, write_particles
 from jamshape.files.vocabulary import FORMAT_VERSION, require_format
 from jamshape.landscape import Landscape, State
+from jamshape.packing import Packing
 from jamshape.vibration.elasticity import Moduli, moduli
 from jamshape.vibration.hessian import LARGEST_RESIDUAL, Coordinates, DynamicalMatrix
 from jamshape.vibration.spectrum import Spectrum, state_error
@@ -282,7 +284,12 @@ def _stored_modulus(attributes: Mapping[str, Any], key: str) -> Modulus:
 
 
 def write_modes(
-    path: PathLike, table: ModeTable, attributes: Mapping[str, Any], *, vectors: bool
+    path: PathLike,
+    table: ModeTable,
+    attributes: Mapping[str, Any],
+    *,
+    vectors: bool,
+    packing: Packing | None = None,
 ) -> None:
     """Write a table; an existing file is replaced only when writing is complete.
 
@@ -294,6 +301,8 @@ def write_modes(
         More to store, such as those of the packing.
     vectors : bool
         Whether to store the eigenvectors.
+    packing : Packing, optional
+        Stored beside eigenvectors, which move it.
 
     Raises
     ------
@@ -307,6 +316,8 @@ def write_modes(
         hdf5.set_attributes(file["modes"], {"format_version": FORMAT_VERSION, "version": version()})
         if vectors:
             hdf5.put(file, "modes/vectors", table.vectors)
+            if packing is not None:
+                write_particles(file.create_group("particles/all"), [packing])
         for name in ("particle", "kind", "direction"):
             hdf5.put(file, f"coordinates/{name}", getattr(c, name))
         size = {"n_all": c.n_all, "dimension": c.dimension}
@@ -331,6 +342,12 @@ def read_modes(path: PathLike) -> ModeTable:
             creator = str(hdf5.attribute(group, "version", "0.1.0"))
             require_format(path, int(hdf5.attribute(group, "format_version", 2)), creator)
         return table_of(file)
+
+
+def read_moved(path: PathLike) -> Packing | None:
+    """Read the packing beside eigenvectors; None where there is none. Errors as `read_modes`."""
+    with hdf5.reading(path) as file:
+        return read_frame(file, 0) if hdf5.has_item(file, "particles/all") else None
 
 
 def holds_modes(path: PathLike) -> bool:

@@ -170,18 +170,19 @@ class ElasticTensor:
         """Evaluate a function of the matrix over (d, q) strains that changes by no more than the spectral norm."""
         unit = np.where([name[0] == name[1] for name in self.components], 1.0, math.sqrt(2))
 
-        def matrix(entries: FloatArray) -> FloatArray:
-            return np.asarray(scale * onto.T @ (unit[:, None] * unit * entries) @ onto)
+        def evaluated(entries: FloatArray) -> float:
+            if not np.isfinite(entries).all():
+                return math.nan
+            return float(value(scale * onto.T @ (unit[:, None] * unit * entries) @ onto))
 
         def bounded(entries: FloatArray) -> float:
             if not np.isfinite(entries).all():
                 return math.inf
             return scale * float(np.linalg.norm(unit[:, None] * unit * entries, 2))
 
-        defined = bool(np.isfinite(self.relaxed).all())
         return Modulus(
-            relaxed=float(value(matrix(self.relaxed))) if defined else math.nan,
-            affine=float(value(matrix(self.affine))),
+            relaxed=evaluated(self.relaxed),
+            affine=evaluated(self.affine),
             rounding=bounded(self.rounding),
             of_state=bounded(self.of_state),
             reason=next(filter(None, self.reasons), ""),

@@ -1,40 +1,13 @@
 """Tiny files of every kind, made by the command itself in this process, which saves the time of starting it."""
 
-import contextlib
-import io
-import json
-from typing import NamedTuple
-
 import pytest
-
-from jamshape.commands import main
+from in_process import jamshape
 
 FAST = ("--alpha", 1, "--n", 16)
 RUN = (*FAST, "--kappa", 1e-3, "--phi-start", 0.5, "--phi-end", 0.88, "--rows", 20, "--frames", 4)
 PACK = (*FAST, "--phi-start", 0.55, "--u0", 1e-6)
 DYNAMICS = ("--protocol", "dynamics", "--kappa", 1e-5, "--p-end", 3e-3)
 SLOW = ("--kappa", 1e-4, "--phi-end", 0.64)
-
-
-class Ended(NamedTuple):
-    """Result of a command."""
-
-    code: int | str | None
-    """The code of `SystemExit`: a text is a sentence on standard error."""
-    out: str
-    arguments: tuple
-    """To end so again."""
-
-    @property
-    def report(self):
-        return json.loads(self.out.splitlines()[-1], parse_constant=pytest.fail)
-
-
-def jamshape(*arguments):
-    """Run a command line in this process."""
-    with contextlib.redirect_stdout(io.StringIO()) as out, pytest.raises(SystemExit) as end:
-        main([str(one) for one in arguments])
-    return Ended(end.value.code, out.getvalue(), arguments)
 
 
 @pytest.fixture(name="jamshape")

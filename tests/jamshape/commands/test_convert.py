@@ -293,6 +293,9 @@ def test_modes_without_the_numbers_of_today(jamshape, tmp_path):
     assert moduli.bulk.relaxed == table.attributes["bulk_modulus"]
     assert moduli.bulk.bound == np.inf
     assert (moduli.n_floppy, moduli.n_unsettled, moduli.n_negative) == (0, 0, 0)
+    assert "the file has no elastic tensors" in moduli.B["xyxy"].reason
+    assert np.isnan(moduli.B.G_dc.relaxed)
+    assert moduli.is_stable_to_shear is None
     assert js.Interaction.told(of_packing(table)) == js.Interaction()
     assert {"k_e", "sides"} <= of_packing(table).keys()
 

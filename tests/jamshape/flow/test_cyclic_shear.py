@@ -1,10 +1,10 @@
 """Cyclic shear in LAMMPS, recorded in a file: its strain, energy balance, and displacements from cycle to cycle."""
 
-import subprocess
-import sys
+import json
 
 import numpy as np
 import pytest
+from in_process import jamshape
 from scipy.integrate import simpson
 
 import jamshape as js
@@ -181,27 +181,24 @@ def test_it_is_loaded_resumed_shown_and_described_as_what_it_is(tmp_path):
     file = tmp_path / "a.h5"
     words = ("cycle", "--alpha", 0, "--n", 12, "--phi", 0.7, "--amplitude", 0.02, "--period", 40, "--cycles", 2,
              "--rows", 8, "--out", file)  # fmt: skip
-    said = jamshape(*words)
-    assert '"displacement": ' in said
-    assert jamshape(*words) == said
+    said = jamshape(*words).out
+    told = json.loads(said.splitlines()[-1])
+    assert told["displacement"] > 0
+    assert [cycle["number"] for cycle in told["per_cycle"]] == [1, 2]
+    assert jamshape(*words).out == said
     run = js.load(file)
     assert isinstance(run, js.CyclicShearFile)
     assert js.resume(file, progress=False).gdot == 0.002
     axes = run.plot()
     assert "cyclic shear" in axes.get_title()
     assert [line.get_label() for line in axes.lines][1:] == ["cycle 1", "cycle 2"]
-    said = jamshape("info", file)
+    said = jamshape("info", file).out
     assert "a.h5: cyclic shear" in said
     assert "simple shear to strains of +-0.02, 2 cycles of the period 40" in said
-
-
-def jamshape(*words):
-    return subprocess.run(
-        [sys.executable, "-m", "jamshape", *map(str, words)],
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout
+    last = run.cycles()[-1]
+    assert f"number 2, work {last.work:.4g}, lost {last.lost:.4g}, storage modulus" in said
+    assert json.loads(said.splitlines()[-1])["last_cycle"] == last._asdict()
+    assert f"$G''={last.loss:.3g}$" in axes.get_title()
 
 
 def test_a_rate_that_contacts_do_not_bear_is_told_before_the_run(tmp_path):

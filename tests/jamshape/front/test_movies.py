@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 import subprocess
-import sys
 
 import numpy as np
 import pytest
 from PIL import Image
 
 import jamshape as js
+from jamshape.commands import main
 from jamshape.drawing.movie import Movie
+from jamshape.files.hdf5 import FileFormatError
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +49,7 @@ def collections(movie, frame):
 
 
 def test_a_run_has_a_frame_for_each_of_its_own(run, tmp_path):
-    js.animate(run, tmp_path / "run.gif", fps=5)
+    js.animate(run, tmp_path / "run.gif", fps=5, dpi=40)
     with Image.open(tmp_path / "run.gif") as image:
         assert image.n_frames in {len(run), len(run) - 1}  # the start may equal its minimum
         durations = []
@@ -54,7 +57,7 @@ def test_a_run_has_a_frame_for_each_of_its_own(run, tmp_path):
             image.seek(k)
             durations.append(image.info["duration"])
     assert sum(durations) == pytest.approx(200 * len(run), rel=0.05)
-    js.animate(run, tmp_path / "few.gif", every=4)
+    js.animate(run, tmp_path / "few.gif", every=4, dpi=40)
     with Image.open(tmp_path / "few.gif") as image:
         assert image.n_frames == 3
 
@@ -130,12 +133,45 @@ def test_notebooks_show_a_player_and_orders_have_one_scale(run):
     assert len(movie.draw(0).axes) == 2
 
 
+def test_modes_of_a_file_swing_as_those_in_memory(packing, tmp_path):
+    modes = js.modes(packing)
+    modes.save(tmp_path / "modes.h5")
+    read = js.load(tmp_path / "modes.h5")
+    assert read.packing.u == packing.u  # to the last bit, with its law
+    assert read.packing.results["u0"] == packing.results["u0"]
+    own, again = (js.animate(one, 9, amplitude=1.0) for one in (modes, read))
+    assert (pixels(own, 5) == pixels(again, 5)).all()
+    read.save(tmp_path / "copy.h5")
+    assert js.load(tmp_path / "copy.h5").packing.u == packing.u
+    with pytest.raises(FileFormatError, match="holds modes"):
+        js.minimise(tmp_path / "modes.h5")
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="there is no ffmpeg")
+@pytest.mark.parametrize("suffix", [".mp4", ".mkv"])
+def test_ffmpeg_writes_the_frames_that_are_drawn(run, suffix, tmp_path):
+    file, still = tmp_path / f"run{suffix}", tmp_path / "%d.png"
+    js.animate(run, file, fps=4, every=4, dpi=60)
+    subprocess.run(["ffmpeg", "-v", "error", "-i", file, still], check=True)
+    movie = js.animate(run, every=4, dpi=60)
+    assert len(list(tmp_path.glob("*.png"))) == len(movie) == 3
+    for k in range(3):
+        found = np.asarray(Image.open(tmp_path / f"{k + 1}.png").convert("RGB")).astype(int)
+        drawn = pixels(movie, k)[: found.shape[0], : found.shape[1], :3]
+        assert found.shape == drawn.shape  # even, or one pixel less
+        assert abs(found - drawn).mean() < 4  # of 255; other frames differ by more
+        assert (
+            abs(found - pixels(movie, (k + 1) % 3)[: found.shape[0], : found.shape[1], :3]).mean()
+            > 8
+        )
+
+
 def test_what_is_wrong_is_said(run, packing, tmp_path, monkeypatch):
     from matplotlib import animation  # noqa: PLC0415
 
     monkeypatch.setattr(animation.writers, "is_available", lambda _: False)
     modes = js.modes(packing)
-    modes.save(tmp_path / "modes.h5")
+    modes.save(tmp_path / "modes.h5", vectors=False)
     for call, words in (
         (lambda: js.animate(run, "x.mp4"), "needs ffmpeg, which is not installed; .* ends in .gif"),
         (lambda: js.animate(run, "x.png"), "has the suffix '.png', expected one of .gif"),
@@ -150,7 +186,10 @@ def test_what_is_wrong_is_said(run, packing, tmp_path, monkeypatch):
             "mode is 48, expected a whole number of a mode from -48 to 47|expected",
         ),
         (lambda: js.animate(modes, 4, every=2), "every=2 has no effect with mode=4"),
-        (lambda: js.animate(js.load(tmp_path / "modes.h5"), 4), "modes were read from a file"),
+        (
+            lambda: js.animate(js.load(tmp_path / "modes.h5"), 4),
+            "modes.h5 holds no packing with its",
+        ),
         (lambda: js.animate([]), "no packings were given"),
         (lambda: js.animate([1, 2]), "expected a packing in each frame"),
         (lambda: js.animate(3), "expected a run, modes or packings in a row"),
@@ -160,19 +199,25 @@ def test_what_is_wrong_is_said(run, packing, tmp_path, monkeypatch):
     assert not list(tmp_path.glob("x.*"))
 
 
-def test_the_command_makes_a_movie(run, tmp_path):
+def test_the_command_makes_a_movie(run, packing, tmp_path, monkeypatch, capsys):
     def draw(*words):
-        call = [sys.executable, "-m", "jamshape", "draw", run.file, *words]
-        return subprocess.run(call, cwd=tmp_path, capture_output=True, text=True, check=False)
+        with pytest.raises(SystemExit) as end:
+            main(["draw", *map(str, words)])
+        return capsys.readouterr().out.splitlines()[-1:], end.value.code
 
-    done = draw("--out", "run.gif", "--every", "4")
-    assert done.stdout.splitlines()[-1:] == ['{"out": "run.gif", "frames": 3}'], done.stderr
-    with Image.open(tmp_path / "run.gif") as image:
-        assert image.n_frames == 3
+    monkeypatch.chdir(tmp_path)
+    js.modes(packing).save("modes.h5")
+    done = draw(run.file, "--out", "run.gif", "--every", 4, "--dpi", 40)
+    assert done == (['{"out": "run.gif", "frames": 3}'], None)
+    (said,), _ = draw("modes.h5", "--mode", 9, "--amplitude", 1, "--out", "mode.gif", "--dpi", 50)
+    assert json.loads(said)["omega"] == js.load("modes.h5").omega[9]
+    for name, frames in (("run", 3), ("mode", 24)):
+        with Image.open(f"{name}.gif") as image:
+            assert image.n_frames == frames
     for words, text in (
-        (("--out", "a.gif", "--frame", "2"), "--frame 2 has no effect on a movie"),
-        (("--out", "a.png", "--fps", "2"), "--fps 2.0 has no effect on a picture"),
+        ((run.file, "--out", "a.gif", "--frame", 2), "--frame 2 has no effect on a movie"),
+        ((run.file, "--out", "a.png", "--fps", 2), "--fps 2.0 has no effect on a picture"),
+        ((run.file, "--out", "a.gif", "--mode", 2), "--mode 2 has no effect on a QuasistaticS"),
+        (("modes.h5", "--out", "a.gif"), "--mode is missing, expected the number of a mode"),
     ):
-        done = draw(*words)
-        assert done.returncode == 1
-        assert text in done.stderr
+        assert text in draw(*words)[1]

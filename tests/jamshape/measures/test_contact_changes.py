@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from in_process import jamshape
 from small_packings import jammed
 
 import jamshape as js
@@ -159,12 +157,13 @@ def test_wrong_values_are_refused(run, start):
         js.ladder(start, u0=[1e-6], file=run.file, progress=False)
 
 
-def test_the_command_reports_changes_and_draws(run, tmp_path):
+def test_the_command_reports_changes_and_draws(run, tmp_path, monkeypatch):
     run.packing(0).save(tmp_path / "packing.h5")
+    monkeypatch.chdir(tmp_path)
     words = "packing.h5 --u0 1e-5 1e-6 --out l.h5 --plot l.png --within 1e-2 --step-back"
-    call = [sys.executable, "-m", "jamshape", "ladder", *words.split()]
-    done = subprocess.run(call, cwd=tmp_path, capture_output=True, text=True, check=True)
-    found = json.loads(done.stdout.splitlines()[-1])
+    done = jamshape("ladder", *words.split())
+    assert not done.code
+    found = done.report
     assert [state["u0"] for state in found["states"]][1:] == [1e-5, 1e-6]
     assert found["opened"] == sum(state["opened"] for state in found["states"])
     assert len(found["changes"]) >= found["opened"] + found["closed"] > 0

@@ -13,8 +13,11 @@ from matplotlib.figure import Figure
 
 import jamshape as js
 from jamshape.checks import TimeLimitError
-from jamshape.files.h5md import read_attributes
+from jamshape.commands.contents import contents_of
+from jamshape.files.h5md import FileFormatError, read_attributes
 from jamshape.files.origin import origin
+from jamshape.protocols.defaults import recipe_for
+from jamshape.protocols.ensemble import Means, plan, plan_again
 
 DISCS = js.Spherocylinders(alpha=0)
 HOW = {"n": 16, "u0": 1e-8, "seeds": range(3, 11), "progress": False}
@@ -80,7 +83,41 @@ def test_it_stops_in_time_and_goes_on(table, tmp_path):
     with pytest.raises(TimeLimitError, match=r"stopped after 0 s at \d of 8, expected the end"):
         js.ensemble(DISCS, **HOW, file=file, seconds=0.0)
     assert not js.load(file).about["finished"]
+    copy, folder = tmp_path / "copy.h5", tmp_path / "packings"
+    copy.write_bytes(file.read_bytes())
+    assert contents_of(copy)["go_on"] == f"js.resume({str(copy)!r}) in Python"
+    assert same(table, js.resume(copy, progress=False))
     assert same(table, js.ensemble(DISCS, **HOW, file=file))
+    with pytest.raises(TimeLimitError):
+        js.ensemble(DISCS, **HOW, file=file, again=True, folder=folder, seconds=0.0)
+    assert same(table, js.resume(file, progress=False))
+    assert len(list(folder.glob("alpha0_seed*.h5"))) == 8
+
+
+@pytest.mark.parametrize(
+    "particles",
+    [
+        js.Superellipsoids(p=1.5, w1=0.8, w2=1.0),
+        js.Dimers(alpha=0.5, size_ratio=1.2),
+        js.Particles.mixture("spherocylinder", [js.Kind({"alpha": 2}, np.float64(1.5), 3), js.Kind()]),
+    ],
+)  # fmt: skip
+def test_a_file_describes_its_particles(particles):
+    means = Means.of(1, None, particles, {"u0": 1e-6, "n": np.int64(12), "protocol": "steps"})
+    stored = {"arguments": means.arguments, "folder": "", "ensemble_seeds": np.arange(3)}
+    first = plan(recipe_for(particles, seed=0, u0=1e-6, n=12, protocol="steps"), range(3), means)
+    assert plan_again(stored).settings.keys() == first.settings.keys()
+    for name, value in first.settings.items():
+        assert np.array_equal(plan_again(stored).settings[name], value), name
+
+
+def test_one_of_particles_that_it_does_not_describe_needs_its_call(tmp_path):
+    many = js.Particles.given("spherocylinder", np.repeat([[1.0], [1.4]], 8, axis=0) * np.ones(3))
+    file = tmp_path / "set.h5"
+    with pytest.raises(TimeLimitError):
+        js.ensemble(many, **HOW | {"seeds": [1, 2]}, file=file, seconds=0.0)
+    with pytest.raises(FileFormatError, match=r"is of the kind ensemble, .* repeat the call"):
+        js.resume(file)
 
 
 def test_another_ensemble_in_the_file_is_refused(table):

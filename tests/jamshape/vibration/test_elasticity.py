@@ -216,8 +216,8 @@ def test_what_a_residual_changes_is_bounded(name):
     for own, other in zip(found[:3], exact[:3], strict=True):
         change = abs(own.relaxed - other.relaxed)
         assert 1e-12 * abs(other.relaxed) < change <= own.bound < 1e-3 * abs(other.relaxed)
-    for name in ("B", "C"):
-        own, other = getattr(found, name), getattr(exact, name)
+    for tensor in ("B", "C"):
+        own, other = getattr(found, tensor), getattr(exact, tensor)
         assert (np.abs(own.relaxed - other.relaxed) <= own.bound).all()
         assert own.bound.max() < 1e-3 * np.abs(other.relaxed).max()
 
