@@ -1,0 +1,201 @@
+"""Packings at rising pressures and their elastic moduli, in files that are kept and not computed again."""
+
+from __future__ import annotations
+
+import json
+import os
+import warnings
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+import jamshape as js
+from jamshape.arrays import FloatArray, IntArray
+from jamshape.checks import NotReachedWarning
+from jamshape.command import plain
+from jamshape.files.disk import store
+from jamshape.landscape import Landscape, State
+from jamshape.minima.target import TargetError
+from jamshape.recording.workers import Workers
+from jamshape.vibration.elasticity import moduli
+from jamshape.vibration.hessian import NotAtMinimumError, dynamical_matrix
+
+SEED = 1  # of the bootstrap
+DRAWS = 1000
+
+# Modules of workers lie in a folder that Python does not know.
+_HERE = str(Path(__file__).parents[1])
+_COMPRESSED = "common.stressed:compressed"
+
+
+class Series(NamedTuple):
+    """Packings of rods, of one seed, at several pressures."""
+
+    alpha: float
+    n: int
+    box: str
+    seed: int
+    pressures: tuple[float, ...]
+    """Ascending, [k_e / R^2]."""
+
+    @property
+    def file(self) -> str:
+        """Name of the file of its results."""
+        span = f"p{self.pressures[0]:.3g}_{self.pressures[-1]:.3g}_{len(self.pressures)}"
+        box = self.box.replace(" ", "-")
+        return f"a{self.alpha:g}_n{self.n}_{box}_{span}_s{self.seed}.json"
+
+
+def add_options(parser: ArgumentParser, samples: int) -> None:
+    """Add the options that choose packings of rods at rising pressures."""
+    parser.add_argument(
+        "--pressures", type=float, nargs=2, default=[1e-6, 1e-2], metavar=("LOW", "HIGH"),
+        help="lowest and highest, in k_e / R^2 (1e-6 1e-2)",
+    )  # fmt: skip
+    parser.add_argument("--per-decade", type=int, default=2, help="pressures (%(default)s)")
+    add_folder(parser, samples)
+
+
+def add_folder(parser: ArgumentParser, samples: int) -> None:
+    """Add the options of every study of many packings."""
+    parser.add_argument("--samples", type=int, default=samples, help="packings (%(default)s)")
+    parser.add_argument(
+        "--runs", type=Path, default=Path("runs/stress"), help="folder of results (%(default)s)"
+    )
+    parser.add_argument("--table", type=Path, help="file of all numbers, JSON (beside the figure)")
+    parser.add_argument("--jobs", type=int, default=1, help="processes (%(default)s)")
+    parser.add_argument(
+        "--only-kept", action="store_true", help="draw from finished packings, make no others"
+    )
+
+
+def pressures_of(options: Namespace) -> tuple[float, ...]:
+    """List the pressures of `add_options`, at equal ratios, to four digits."""
+    (low, high), per_decade = options.pressures, options.per_decade
+    n = round(np.log10(high / low) * per_decade) + 1
+    return tuple(float(f"{p:.4g}") for p in np.geomspace(low, high, n))
+
+
+def compressed(*series: Any) -> list[dict[str, Any]]:
+    """Make the packing of a `Series` at its lowest pressure, raise the pressure, and measure at each."""
+    of, rows = Series(*series), []
+    packing: js.Packing | None = None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NotReachedWarning)  # rows tell
+        for p in of.pressures:
+            try:
+                packing = _led(packing, of, p)
+                rows.append({"pressure": p, **measured(packing)})
+            except (TargetError, NotAtMinimumError) as error:  # the latter on a kink of the energy
+                rows.append({"pressure": p, "reached": False, "failure": str(error)})
+    return rows
+
+
+def _led(packing: js.Packing | None, of: Series, pressure: float) -> js.Packing:
+    if packing is not None:
+        return js.minimise(packing, pressure=pressure, box=of.box, progress=False)
+    particles = js.Spherocylinders(alpha=of.alpha)
+    return js.make_packing(
+        particles, n=of.n, seed=of.seed, pressure=pressure, box=of.box, progress=False
+    )
+
+
+def measured(packing: js.Packing) -> dict[str, Any]:
+    """Measure a packing at a minimum; moduli that are not defined are NaN."""
+    found: dict[str, Any] = {"reached": packing.reached, "phi": packing.phi, "u": packing.u}
+    if not packing.reached:
+        return found
+    landscape, state = Landscape(packing), State.of(packing)
+    matrix = dynamical_matrix(landscape, state)
+    elastic = moduli(matrix, at=(landscape, state))
+    named = {
+        "G": elastic.simple_shear, "G_dc": elastic.B.G_dc, "G_min": elastic.B.G_min, "K": elastic.bulk,
+    }  # fmt: skip
+    found |= {name: one.relaxed for name, one in named.items()}
+    found |= {f"{name}_bound": one.bound for name, one in named.items()}
+    return found | {
+        "n_particles": matrix.n_particles, "n_bonds": len(matrix.bonds.stiffness),
+        "n_floppy": elastic.n_floppy, "n_negative": elastic.n_negative,
+        "is_stable": elastic.is_stable_to_shear,
+    }  # fmt: skip
+
+
+class Task(Protocol):
+    """Arguments of a function, as a tuple, with the file of its result."""
+
+    @property
+    def file(self) -> str:
+        """Name of the file."""
+
+
+def found_of(folder: Path, tasks: Sequence[Task], jobs: int, function: str = _COMPRESSED) -> None:
+    """Compute all tasks without a file in the folder; an interruption keeps finished ones."""
+    folder.mkdir(parents=True, exist_ok=True)
+    missing: list[Any] = [one for one in tasks if not (folder / one.file).exists()]
+    os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [_HERE, os.environ.get("PYTHONPATH")]))
+    with Workers(function, [tuple(one) for one in missing], jobs) as workers:
+        for k, done in enumerate(workers, 1):
+            one = missing[done.number]
+            if done.failure is not None:
+                msg = f"{one.file}: {done.failure}"
+                raise RuntimeError(msg)
+            store(folder / one.file, json.dumps(plain(done.result)).encode())
+            print(f"{k} of {len(missing)}: {one.file}", flush=True)
+
+
+class Table(NamedTuple):
+    """Results of m series of a system at k pressures."""
+
+    pressures: FloatArray
+    """(k,)"""
+    rows: list[list[dict[str, Any]]]
+    """m lists of k rows."""
+
+    def column(self, name: str) -> FloatArray:
+        """(m, k) numbers, NaN where a packing has none; truth is 1 or 0."""
+        rows = [[row.get(name) for row in of] for of in self.rows]
+        return np.array(rows, dtype=np.float64)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+
+def table_of(folder: Path, series: Iterable[Series]) -> Table:
+    """Read the finished ones of series with the same pressures."""
+    every = list(series)
+    paths = [folder / one.file for one in every]
+    rows = [json.loads(path.read_text()) for path in paths if path.exists()]
+    if not rows:
+        msg = f"{folder} has no results of {every[0].file} and others, expected some; leave out --only-kept"
+        raise ValueError(msg)
+    return Table(np.array(every[0].pressures), rows)
+
+
+def write_table(options: Namespace, found: Any) -> None:
+    """Write all numbers of a figure."""
+    path = options.table or options.out.with_suffix(".json")
+    store(path, f"{json.dumps(plain(found), indent=1)}\n".encode())
+
+
+def draws(n: int) -> Iterator[IntArray]:
+    """Draw n samples with replacement, many times."""
+    random = np.random.default_rng(SEED)
+    for _ in range(DRAWS):
+        yield random.integers(0, n, n)
+
+
+def mean_of(columns: FloatArray) -> FloatArray:
+    """Average (m, k) samples, ignoring NaN; NaN where all are."""
+    known = np.isfinite(columns)
+    count = known.sum(axis=0)
+    total = np.where(known, columns, 0).sum(axis=0)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def mean_and_error(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Average (m, k) samples; the standard error by the bootstrap, NaN where a draw has none."""
+    drawn = [mean_of(columns[k]) for k in draws(len(columns))]
+    return mean_of(columns), np.std(drawn, axis=0)

@@ -1,0 +1,222 @@
+"""Scaling of the shear modulus with pressure: <G> = G_0 + c p^beta of discs and rods.
+
+    python analysis/stress/moduli_scaling.py --samples 200 --out moduli_scaling.png
+
+Each packing is made at the lowest pressure, in a box that changes its volume only, and compressed to one pressure after the
+other, as by Zhang, VanderWerf, Li, Zhang, Shattuck & O'Hern, Phys. Rev. E 104, 014901 (2021). G is the change of the shear stress
+under simple shear at a fixed volume. Averages are over all packings, over those of positive G only, and over all packings and all directions of
+shear. Fits are weighted by the standard errors; the errors of beta and G_0 are those of the bootstrap over packings. Finished packings are kept in --runs: a command that is stopped and
+repeated goes on. The last line of standard output is one JSON object.
+"""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from jamshape.arrays import FloatArray
+from jamshape.command import parser_of, report, run
+from jamshape.drawing.saving import save_figure
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.axes import figure_of
+from common.stressed import (
+    Series,
+    Table,
+    add_options,
+    draws,
+    found_of,
+    mean_and_error,
+    mean_of,
+    pressures_of,
+    table_of,
+    write_table,
+)
+from common.styles import marked
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_BETAS = np.linspace(0.1, 2.0, 381)
+AVERAGES = ("all", "positive", "directions")
+"""G of all packings, of those of positive G, and of all packings over all directions of shear."""
+DRAWN = AVERAGES[:2]
+
+
+class Fit(NamedTuple):
+    """G = G_0 + c p^beta."""
+
+    G_0: float
+    c: float
+    beta: float
+    chi2: float
+
+
+def fitted(p: FloatArray, G: FloatArray, error: FloatArray) -> Fit:
+    """Fit by weighted least squares: a line in p^beta for each beta; NaN from fewer than three points."""
+    if len(p) < 3:
+        return Fit(*[np.nan] * 4)
+    weight = error**-2 / (error**-2).sum()
+    x = p ** _BETAS[:, None]
+    x_mean, G_mean = x @ weight, G @ weight
+    off = x - x_mean[:, None]
+    c = (off * (G - G_mean)) @ weight / (off**2 @ weight)
+    G_0 = G_mean - c * x_mean
+    chi2 = (((G - G_0[:, None] - c[:, None] * x) / error) ** 2).sum(axis=1)
+    best = int(np.argmin(chi2))
+    return Fit(float(G_0[best]), float(c[best]), float(_BETAS[best]), float(chi2[best]))
+
+
+class Average(NamedTuple):
+    """Average over packings with its fit."""
+
+    G: FloatArray
+    """(k,) by pressure."""
+    error: FloatArray
+    """(k,)"""
+    fit: Fit
+    errors: Fit
+    """Standard deviations over the bootstrap."""
+
+
+class Scaling(NamedTuple):
+    """Averages of a system."""
+
+    alpha: float
+    n: int
+    samples: int
+    p: FloatArray
+    averages: dict[str, Average]
+    """By `AVERAGES`."""
+    positive: FloatArray
+    """(k,) fraction of packings of positive G."""
+    undefined: FloatArray
+    """(k,) fraction of packings without a modulus: forces do not balance, or a floppy mode couples."""
+    last: float
+    """Highest pressure of the fit."""
+
+
+def columns_of(table: Table) -> dict[str, FloatArray]:
+    """List (m, k) moduli to average, as in `AVERAGES`."""
+    G = table.column("G")
+    return dict(zip(AVERAGES, (G, np.where(G > 0, G, np.nan), table.column("G_dc")), strict=True))
+
+
+def scaling_of(alpha: float, n: int, table: Table, last: float) -> Scaling:
+    """Average and fit."""
+    G, p = table.column("G"), table.pressures
+    averages = {name: average_of(p, of, last) for name, of in columns_of(table).items()}
+    positive = mean_of(np.where(np.isfinite(G), G > 0, np.nan))
+    undefined = np.isnan(G).mean(axis=0)
+    return Scaling(alpha, n, len(G), p, averages, positive, undefined, last)
+
+
+def average_of(p: FloatArray, G: FloatArray, last: float) -> Average:
+    """Average (m, k) moduli and fit, up to a pressure; a fifth of the draws is fitted."""
+    mean, error = mean_and_error(G)
+    of = (p <= last * (1 + 1e-9)) & (error > 0)
+    drawn = [fitted(p[of], mean_of(G[k][:, of]), error[of]) for k in list(draws(len(G)))[::5]]
+    return Average(mean, error, fitted(p[of], mean[of], error[of]), Fit(*np.std(drawn, axis=0)))
+
+
+def figure_from(found: list[Scaling]) -> Figure:
+    """Draw G on the left and G - G_0 on the right."""
+    figure = figure_of(9.5, 4.6, dpi=160)
+    left, right = figure.subplots(1, 2)
+    for axes in (left, right):
+        axes.set(xscale="log", yscale="log", xlabel=r"pressure $p$  $[k_e/R^2]$")
+    for k, of in enumerate(found):
+        for j, name in enumerate(DRAWN):
+            style = marked(k + j * len(found))
+            label = rf"$\alpha={of.alpha:g}$, {of.samples} packings" + ", of $G>0$" * (
+                name != "all"
+            )
+            average = of.averages[name]
+            left.errorbar(of.p, average.G, average.error, **style, label=label)
+            _draw_power(right, of, name, style)
+    left.set(ylabel=r"shear modulus $\langle G\rangle$  $[k_e/R^2]$")
+    right.set(ylabel=r"$\langle G\rangle-G_0$  $[k_e/R^2]$")
+    left.legend(fontsize=7)
+    right.legend(fontsize=7)
+    names = ", ".join(f"{of.alpha:g}" for of in found)
+    figure.suptitle(
+        rf"spherocylinders in 2D, $\alpha={names}$, $N={found[0].n}$, size ratio 1.4, compressed to $p$ in square boxes"
+        "\nbars: standard errors over packings, by the bootstrap; lines: fits of $G_0+cp^\\beta$",
+        fontsize=9,
+    )
+    return figure
+
+
+def _draw_power(axes: Axes, of: Scaling, name: str, style: dict[str, Any]) -> None:
+    average = of.averages[name]
+    fit, above = average.fit, average.G - average.fit.G_0
+    own = above > average.error
+    axes.errorbar(of.p[own], above[own], average.error[own], **style)
+    p = of.p[of.p <= of.last * (1 + 1e-9)]
+    label = rf"$\alpha={of.alpha:g}$" + ", $G>0$" * (name != "all")
+    label += rf": $\beta=${fit.beta:.2f}$\pm${average.errors.beta:.2f}"
+    axes.plot(p, fit.c * p**fit.beta, "-", lw=0.9, color=style["color"], label=label)
+
+
+def summary(of: Scaling) -> dict[str, Any]:
+    """Describe a system in JSON."""
+    fits = {
+        name: {
+            "G_0": one.fit.G_0, "G_0_error": one.errors.G_0, "c": one.fit.c,
+            "beta": one.fit.beta, "beta_error": one.errors.beta, "chi2": one.fit.chi2,
+        }
+        for name, one in of.averages.items()
+    }  # fmt: skip
+    points = [
+        {"pressure": p, "fraction_positive": of.positive[k], "fraction_undefined": of.undefined[k]}
+        | {f"G_{name}": one.G[k] for name, one in of.averages.items()}
+        | {f"G_{name}_error": one.error[k] for name, one in of.averages.items()}
+        for k, p in enumerate(of.p)
+    ]
+    told = {"alpha": of.alpha, "n": of.n, "samples": of.samples, "fitted_to": of.last}
+    return {**told, "fits": fits, "points": points}
+
+
+def parser() -> ArgumentParser:
+    """Make the parser of the command line."""
+    found = parser_of(__doc__, "moduli_scaling.png")
+    found.add_argument("--alpha", type=float, nargs="+", default=[0.0, 1.0])
+    found.add_argument("--n", type=int, default=64)
+    found.add_argument(
+        "--fit-to", type=float, default=1e-2, help="highest pressure of the fit (%(default)s)"
+    )
+    add_options(found, samples=200)
+    return found
+
+
+def main(options: Namespace) -> None:
+    """Make, average, fit, draw, report."""
+    pressures = pressures_of(options)
+    seeds = range(1, options.samples + 1)
+    every = [
+        Series(alpha, options.n, "isotropic", seed, pressures)
+        for seed in seeds
+        for alpha in options.alpha
+    ]
+    if not options.only_kept:
+        found_of(options.runs, every, options.jobs)
+    tables = [
+        table_of(options.runs, (one for one in every if one.alpha == a)) for a in options.alpha
+    ]
+    found = [
+        scaling_of(alpha, options.n, table, options.fit_to)
+        for alpha, table in zip(options.alpha, tables, strict=True)
+    ]
+    save_figure(figure_from(found), options.out)
+    systems = [summary(of) for of in found]
+    write_table(options, systems)
+    report({"out": options.out, "systems": systems})
+
+
+if __name__ == "__main__":
+    run(parser(), main)
