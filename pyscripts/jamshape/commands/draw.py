@@ -27,12 +27,14 @@ from jamshape.drawing.movie import MOVIES
 from jamshape.drawing.packing import Look
 from jamshape.drawing.pictures import draw_pictures, read_picture, save_pictures
 from jamshape.files.meaning import Wanted
+from jamshape.files.signature import HDF5, format_of
 from jamshape.front.files import load
 from jamshape.front.frames import frames
 from jamshape.front.modes import Modes
 from jamshape.front.movies import animate
 from jamshape.packing import Packing
 from jamshape.shapes.command_line import add_meaning_options
+from jamshape.vibration.table import holds_modes
 
 _ANGLE = Range(-360.0, 360.0, "degrees")
 
@@ -119,6 +121,10 @@ def main(options: Namespace) -> None:
         _movie(options)
         return
     _require_none(options, "every", "fps", "mode", "amplitude")
+    for path in options.files:
+        if format_of(path) == HDF5 and holds_modes(path):
+            msg = f"{path} holds modes, expected particles; draw a mode with --mode and a movie, such as --out mode.gif"
+            raise ValueError(msg)
     dpi = _PIXELS if options.dpi is None else options.dpi
     require_stated(dpi=dpi)
     for name, value in typed(options, "height", "turn").items():

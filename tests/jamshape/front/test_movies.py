@@ -219,5 +219,9 @@ def test_the_command_makes_a_movie(run, packing, tmp_path, monkeypatch, capsys):
         ((run.file, "--out", "a.png", "--fps", 2), "--fps 2.0 has no effect on a picture"),
         ((run.file, "--out", "a.gif", "--mode", 2), "--mode 2 has no effect on a QuasistaticS"),
         (("modes.h5", "--out", "a.gif"), "--mode is missing, expected the number of a mode"),
+        (
+            ("modes.h5", "--out", "a.png"),
+            "holds modes, expected particles; draw a mode with --mode",
+        ),
     ):
         assert text in draw(*words)[1]
