@@ -539,7 +539,7 @@ void FixOverdampedAffine::initial_integrate(int)
   ask_for_flip();
 }
 
-/// For output: the rate of the box at the end of the step.
+/// Sets the rate of the box at the end of the step, for output.
 void FixOverdampedAffine::final_integrate() { control->follow(); }
 
 /// Atoms change their images with the cell, which is possible only when LAMMPS builds its lists.

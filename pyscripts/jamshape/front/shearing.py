@@ -144,17 +144,8 @@ def shear(
     of = Start.of(particles, asked, start, usual_phi=0.8, sides=sides, phi_name=_PHI_NAME)
     at = place(file, "shear.h5")
     whole = dt is None and sides == 2
-    if pressure:
-        held = {
-            "hold_pressure": pressure,
-            "t_box": max(1.0, 0.01 / gdot) if t_box is None else t_box,
-        }
-        integrator = integrator or ("rkc2" if whole else "heun")
-        _require_yielding(integrator, flow)
-    else:
-        require_no_effect("pressure", pressure, t_box=t_box)
-        held = {}
-        integrator = integrator or _usual(gdot, of.dimension, whole=whole)
+    integrator = integrator or _usual(gdot, of.dimension, whole=whole, yields=pressure > 0)
+    held = _held(pressure, t_box, gdot, flow, integrator)
     if integrator in METHODS:
         require_no_effect("integrator", integrator, dt=dt, frames=frames)
         longest = min(SlowShear.largest_strain, strain / rows)
@@ -166,8 +157,7 @@ def shear(
     else:
         settings = Shear(
             gdot=gdot, strain_end=strain, flow=flow, dt=min(0.05, 0.01 / gdot) if dt is None else dt,
-            sides=sides, k_e=of.k_e, integrator=integrator, tolerance=integration_tolerance or _ERROR,
-            **held,
+            sides=sides, k_e=of.k_e, integrator=integrator, tolerance=integration_tolerance or _ERROR, **held,
         )  # fmt: skip
         settings = _in_rows(settings, rows, dt=dt, integration_tolerance=integration_tolerance)
         sizes = Sizes(rows, _FRAMES if frames is None else frames)
@@ -426,21 +416,27 @@ def _in_rows(settings: Shear, rows: int, **given: float | None) -> Shear:
     return settings.in_steps(rows) if settings.chooses_steps else settings
 
 
-def _usual(gdot: float, dimension: int, *, whole: bool) -> str:
-    """Choose the default integrator."""
+def _usual(gdot: float, dimension: int, *, whole: bool, yields: bool) -> str:
+    """Choose the default integrator; implicit steps are for a fixed volume."""
     if not whole:
         return "heun"
-    return "tr-bdf2" if gdot <= _SLOW[dimension] else "rkc2"
+    return "tr-bdf2" if gdot <= _SLOW[dimension] and not yields else "rkc2"
 
 
-def _require_yielding(integrator: str, flow: str) -> None:
-    """Refuse what does not go with a pressure."""
+def _held(
+    pressure: float, t_box: float | None, gdot: float, flow: str, integrator: str
+) -> dict[str, float]:
+    """Return the settings of a pressure to hold, none without one, and refuse what does not go with it."""
+    if not pressure:
+        require_no_effect("pressure", pressure, t_box=t_box)
+        return {}
     if integrator in METHODS:
         said = "{integrator} holds the volume, expected rkc2, heun/adaptive or heun with a pressure"
         raise ArgumentError(said, {"integrator": integrator})
     if flow != "simple":
         said = "{flow} shear drives the height of the box, expected simple shear with a pressure"
         raise ArgumentError(said, {"flow": flow})
+    return {"hold_pressure": pressure, "t_box": max(1.0, 0.01 / gdot) if t_box is None else t_box}
 
 
 def _require_cycle(amplitude: float, period: float, rows: int) -> None:
