@@ -137,7 +137,7 @@ def test_pair_coeff_has_three_arguments(sentence_of):
 
 
 SYNTAX = (
-    "'drag k_d [compress kappa] [shear gdot] [pure edot] [gradient ...] [volume free|constant] [flip F] [integrator NAME] "
+    "'drag k_d [compress kappa] [shear gdot] [pure edot] [gradient ...] [pressure iso START STOP] [stress ab P] [tbox T] [volume free|constant] [flip F] [integrator NAME] "
     "[tolerance T] [stages MAX] "
     "[reference center|corner] [check N]'."
 )
