@@ -1,5 +1,6 @@
 """Boxes that yield: pressure tensors are those asked for, and the enthalpy has a minimum there."""
 
+import math
 from functools import cache
 
 import numpy as np
@@ -7,9 +8,10 @@ import pytest
 
 import jamshape as js
 from jamshape.checks import ArgumentError
-from jamshape.landscape import Landscape, State
+from jamshape.landscape import CrossingError, Landscape, State
 from jamshape.minima import Stop, minimise
 from jamshape.minima.boxes import COMPONENTS, Settling, Yielding, advance, strains_of
+from jamshape.minima.target import TargetError
 
 SCENES = {
     "discs": (js.Spherocylinders(alpha=0), 24, 2),
@@ -147,3 +149,50 @@ def test_what_cannot_be_is_refused(name, given, said):
     with pytest.raises((ValueError, ArgumentError)) as caught:
         Yielding(name, **given).find(Landscape(jammed("discs")), State.of(jammed("discs")))
     assert said in str(caught.value)
+
+
+# --- many seeds, and extremes ---------------------------------------------------------------------
+
+SIX = ("discs", "rods", "long rods", "dimers", "spheres", "spheroids")
+
+
+@pytest.mark.validate
+@pytest.mark.parametrize("name", SIX)
+def test_every_seed_ends(name, measured):
+    """At its pressure, without shear stress."""
+    particles, n, dimension = SCENES[name]
+    missed = []
+    for seed in range(1, 21):
+        given = {"n": n, "dimension": dimension, "seed": seed, "pressure": 1e-4, "box": "free"}
+        try:
+            packing = js.make_packing(particles, progress=False, **given)
+        except TargetError:
+            missed.append(seed)
+            continue
+        tensor = js.energy(packing).pressure_tensor
+        np.testing.assert_allclose(tensor, 1e-4 * np.eye(dimension), rtol=0, atol=2e-12)
+    measured(missed=len(missed))
+    assert missed == []
+
+
+@pytest.mark.validate
+@pytest.mark.parametrize("box", ["isotropic", "free"])
+@pytest.mark.parametrize("pressure", [1e-10, 1e-1])
+@pytest.mark.parametrize(
+    ("particles", "n", "dimension"),
+    [
+        (js.Spherocylinders(alpha=1e-3), 32, 2),
+        (js.Spherocylinders(alpha=20), 8, 2),  # in a box shorter than a particle
+        (js.Superellipsoids(p=1, w1=1, w2=1), 32, 3),
+        (js.Spherocylinders(alpha=5), 12, 3),
+    ],
+    ids=str,
+)
+def test_extremes_end_at_the_target_or_in_a_sentence(particles, n, dimension, pressure, box):
+    given = {"n": n, "dimension": dimension, "pressure": pressure, "box": box}
+    said = ""
+    try:
+        found = js.make_packing(particles, progress=False, **given).pressure
+    except (TargetError, CrossingError) as error:
+        said, found = str(error), math.nan
+    assert "expected" in said or found == pytest.approx(pressure, rel=1e-8)
