@@ -39,4 +39,4 @@ def rotation_rates(
     velocity = -landscape.evaluate(State.of(packing)).gradient / drag_coefficients(landscape, k_d)
     _, turns = landscape.motion(velocity)
     angle = np.asarray(packing.orientation, np.float64)
-    return np.asarray(host.spin(landscape.bodies, angle) + turns[:, 0])
+    return np.asarray((host.spin(landscape.bodies, angle[:, None]) + turns)[:, 0])

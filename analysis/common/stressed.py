@@ -20,6 +20,7 @@ from jamshape.files.disk import store
 from jamshape.landscape import Landscape, State
 from jamshape.minima.target import TargetError
 from jamshape.recording.workers import Workers
+from jamshape.shapes.particles import Particles
 from jamshape.vibration.elasticity import moduli
 from jamshape.vibration.hessian import NotAtMinimumError, dynamical_matrix
 
@@ -97,7 +98,7 @@ def compressed(*series: Any) -> list[dict[str, Any]]:
 def _led(packing: js.Packing | None, of: Series, pressure: float) -> js.Packing:
     if packing is not None:
         return js.minimise(packing, pressure=pressure, box=of.box, progress=False)
-    particles = js.Spherocylinders(alpha=of.alpha)
+    particles = Particles.of(alpha=of.alpha)
     return js.make_packing(
         particles, n=of.n, seed=of.seed, pressure=pressure, box=of.box, progress=False
     )

@@ -156,7 +156,7 @@ CASES = [
     (f"{SLOW} --kappa-before 1e-6", "--kappa-before 1e-06 has no effect without --phi-slow, expected both or neither"),
     (f"{SLOW} --phi-slow 0.9", "--phi-slow 0.9 is not below --phi-end, .* expected a smaller one"),
     *((f"{command} --start start.h5 {option} --out new.h5", f"{option} has no effect with --start start.h5")
-      for command in ("shear", "cycle", "aqs") for option in ("--phi 0.7", "--n 8", "--seed 1", "--dimension 2")),
+      for command in ("shear", "cycle", "aqs") for option in ("--phi 0.7", "--n 8", "--seed 1")),
     ("shear --start start.h5 --alpha 4 --out new.h5", "has no effect with --start start.h5"),
     *each("cycle --n 8 --out new.h5", ["--amplitude", "--period", "--dt", "--integration-tolerance"], NO_NUMBERS),
     *each("cycle --n 8 --out new.h5", ["--cycles", "--rows", "--frames"], NO_COUNTS),

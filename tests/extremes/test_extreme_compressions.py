@@ -208,7 +208,6 @@ APART = partial(rods, [[0.0, 0.0], [0.3, 1.2]], [0.0, 1.5], 1.0, 0.5, [6.0, 6.0]
     case(f"{IMPLICIT}: crossing spines", crossed, 1e-6, 3.0, expected=CROSS),
     # Faster than their contact holds.
     case(f"{IMPLICIT}: driven until spines cross", APART, 1e2, 3.0, expected=CROSS),
-    case(f"{IMPLICIT}: 3D", partial(own_images, 3), 1e-6, 2.0, expected=r"dimensions, expected (2|two)"),
 ])  # fmt: skip
 def test_implicit_stops(scene, kappa, phi_end):
     ended(scene(), Protocol(kappa, phi_end))

@@ -74,7 +74,6 @@ def test_another_frame_is_another_run(dump, tmp_path):
         (js.shear, True, f"{FIRST} --alpha 4", "--particles .* has no effect with --start .*two.dump"),
         (js.shear, True, f"{FIRST} --n 4", "--n 4 has no effect with --start .*two.dump"),
         (js.quasistatic_shear, False, "--frame 0", "--frame 0 has no effect without --start"),
-        (js.slow_compress, False, "--dimension 2", "--dimension 2 has no effect without --start"),
         (js.cyclic_shear, True, "--shape dimer --frame 2", "has 2 frames, expected frame 2"),
     ],
 )  # fmt: skip
