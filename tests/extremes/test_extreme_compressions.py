@@ -6,7 +6,7 @@ from functools import cache, partial
 
 import numpy as np
 from extreme import case, extreme
-from extreme_rods import crossed, deep, jammed, own_images, rods
+from extreme_rods import crossed, deep, jammed, rods
 from extreme_shapes import SHAPES
 from extreme_superellipsoids import hard, loose
 from packings_in_a_box import contacts_of, every_image, in_doubles, scaled

@@ -2,11 +2,12 @@
 
 import json
 import runpy
+from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import ANALYSIS
 
+ANALYSIS = Path(__file__).parents[2] / "analysis"
 SMALL = ("--pressures", 1e-4, 1e-2, "--per-decade", 1)
 
 
