@@ -41,7 +41,7 @@ _LINES = {
         "pressure {target_pressure:g}",
         "phi {target_phi:g}",
         "box {box_yields}",
-        "{tries} tries to be stable to shear",
+        "stable to shear at try {tries}",
         "protocol {protocol}",
         "phi from {phi_start:g}",
         "to {phi_end:g}",
