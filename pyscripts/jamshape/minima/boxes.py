@@ -25,10 +25,9 @@ from jamshape.minima.descent import History, Minimum, Outcome, Stop, rounding_fl
 from jamshape.minima.minimise import minimise
 from jamshape.minima.target import Target, TargetError, require_reachable, strain_at
 from jamshape.packing import State
+from jamshape.packing.box import COMPONENTS
 
 FIXED, ISOTROPIC, FREE, SHEAR = "fixed", "isotropic", "free", "xy"
-COMPONENTS = {2: ("xx", "yy", "xy"), 3: ("xx", "yy", "zz", "yz", "xz", "xy")}
-"""Components of the strain of a box, by dimension."""
 
 _MOST_STEPS = 400  # of the box
 _ROUGH = 1e-6  # residual of minima on the way
@@ -280,19 +279,12 @@ class _Posed(NamedTuple):
     """(k + 1, n) motion of the particles by each strain, and by their remaining forces."""
 
 
-def _pressures(landscape: Landscape, at: Settling, goal: Yielding) -> tuple[float, float]:
+def _pressures(tensor: FloatArray, at: Settling, goal: Yielding) -> tuple[float, float]:
     """Return the mean pressure in the components that may change the volume, and the one to reach."""
-    present = at.present
+    present, normal = at.present, strains_of(goal.box, len(tensor))[0]
     assert present is not None
-    tensor, normal = (
-        landscape.stress(present.state),
-        strains_of(goal.box, present.state.dimension)[0],
-    )
-    pressure = (
-        float((tensor * normal).sum() / normal.sum())
-        if normal.any()
-        else float(np.trace(tensor) / len(tensor))
-    )
+    normal = normal if normal.any() else np.eye(len(tensor))
+    pressure = float((tensor * normal).sum() / normal.sum())
     if goal.keeps_volume:
         return pressure, pressure
     if goal.pressure is not None:
@@ -325,7 +317,8 @@ def advance(landscape: Landscape, at: Settling, goal: Yielding) -> None:
         at.present = minimise(landscape, at.state, "auto", Stop(goal.tolerance), at.history)
         if _changes_shape(goal, at.state):
             is_loose = at.present.outcome is Outcome.UNJAMMED
-            present = math.inf if is_loose else _pressures(landscape, at, goal)[0]
+            tensor = landscape.stress(at.present.state)
+            present = math.inf if is_loose else _pressures(tensor, at, goal)[0]
             at.level = min(first_level(landscape), present) if at.first is None else at.first
     elif at.n_steps >= _MOST_STEPS:
         _give_up(at, goal)
@@ -354,8 +347,9 @@ def _judge(landscape: Landscape, at: Settling, goal: Yielding) -> None:
     if present.outcome is Outcome.UNJAMMED:
         at.done, at.stress_error = goal.keeps_volume, 0.0
         return
-    aim = _pressures(landscape, at, goal)[1]
-    at.stress_error = _stress_error(landscape, present, aim, goal)
+    tensor = landscape.stress(present.state)
+    aim = _pressures(tensor, at, goal)[1]
+    at.stress_error = _stress_error(tensor, aim, goal)
     if not goal.keeps_volume and at.level == aim:
         if at.stress_error < _SETTLED:
             at.level *= _LOWER
@@ -367,10 +361,10 @@ def _judge(landscape: Landscape, at: Settling, goal: Yielding) -> None:
     at.done = is_balanced and at.stress_error <= goal.accuracy and _has_energy(present, goal)
 
 
-def _stress_error(landscape: Landscape, found: Minimum, aim: float, goal: Yielding) -> float:
+def _stress_error(tensor: FloatArray, aim: float, goal: Yielding) -> float:
     """Return the largest difference of the stress to its target in the components that yield, over the pressure."""
-    strains = strains_of(goal.box, found.state.dimension)[int(goal.keeps_volume) :]
-    off = landscape.stress(found.state) - goal.stress(aim, found.state.dimension)
+    strains = strains_of(goal.box, len(tensor))[int(goal.keeps_volume) :]
+    off = tensor - goal.stress(aim, len(tensor))
     return float(np.abs(np.einsum("ab,kab->k", off, strains)).max(initial=0.0)) / aim
 
 
@@ -398,7 +392,9 @@ def _changes_shape(goal: Yielding, state: State) -> bool:
 
 def _lift(landscape: Landscape, at: Settling, goal: Yielding) -> None:
     """Continue at a higher pressure where contacts open and close within the smallest steps."""
-    level = max(at.level, _pressures(landscape, at, goal)[1]) / _LOWER
+    assert at.present is not None
+    aim = _pressures(landscape.stress(at.present.state), at, goal)[1]
+    level = max(at.level, aim) / _LOWER
     if (
         at.n_lifts == _MOST_LIFTS
         or goal.keeps_volume
@@ -495,10 +491,11 @@ def _trial(landscape: Landscape, at: Settling, goal: Yielding) -> _Trial:
     present = at.present
     assert present is not None
     state = present.state
-    pressure, aim = _pressures(landscape, at, goal)
+    tensor = landscape.stress(state)
+    pressure, aim = _pressures(tensor, at, goal)
     every = strains_of(goal.box, state.dimension)
     stress = goal.stress(aim, state.dimension)
-    posed = _posed(landscape, present, every[int(goal.keeps_volume) :], stress)
+    posed = _posed(landscape, present, every[int(goal.keeps_volume) :], (tensor, stress))
     from_jamming = strain_at(landscape, present.energy_density)
     largest = min(at.reach * from_jamming, _LONGEST)
     e = _within(posed, largest)
@@ -531,8 +528,10 @@ def _is_better(
     gained += volume * (trial.aim * grown - goal.shear * float(trial.matrix[0, 1]))
     strain = np.abs(trial.matrix - np.eye(len(trial.matrix))).sum()
     noise = _ROUNDING * (present.evaluation.energy + abs(trial.aim) * volume * float(strain))
-    error = _stress_error(landscape, found, trial.aim, goal)
-    settles = trial.is_near and error < 0.5 * at.stress_error
+    error = (
+        _stress_error(landscape.stress(found.state), trial.aim, goal) if trial.is_near else math.inf
+    )
+    settles = error < 0.5 * at.stress_error
     if gained > noise and not settles:
         return False
     if gained < 0.5 * trial.expected or trial.is_near:
@@ -540,8 +539,13 @@ def _is_better(
     return True
 
 
-def _posed(landscape: Landscape, present: Minimum, strains: FloatArray, aim: FloatArray) -> _Posed:
-    """Set up Newton's equations for strains at a target pressure tensor."""
+def _posed(
+    landscape: Landscape,
+    present: Minimum,
+    strains: FloatArray,
+    stresses: tuple[FloatArray, FloatArray],
+) -> _Posed:
+    """Set up Newton's equations for strains, at the pressure tensors that are and are to be."""
     state, volume = present.state, present.state.volume
     least = _SHIFT * landscape.stiffness / landscape.length**2
     shift = max(least, least_shift(landscape, present.evaluation))
@@ -551,7 +555,8 @@ def _posed(landscape: Landscape, present: Minimum, strains: FloatArray, aim: Flo
     # Smaller forces are rounding, which soft modes would amplify.
     gradient = present.evaluation.gradient * (present.residual.largest > _ROUGH / 10)
     response = np.asarray(newton.solve(np.vstack([coupling, gradient]), _ACCURACY))
-    off = landscape.stress(state) - aim
+    tensor, aim = stresses
+    off = tensor - aim
     slope = -volume * np.einsum("ab,kab->k", off, strains) - response[-1] @ coupling.T
     traces = np.trace(strains, axis1=1, axis2=2)
     # Derivatives of V S F^-T, S the target, by F at F = 1.

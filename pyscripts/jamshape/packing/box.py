@@ -18,6 +18,9 @@ from jamshape.arrays import FloatArray, IntArray, real_numbers
 from jamshape.packing.given import as_floats
 from jamshape.records import Record
 
+COMPONENTS = {2: ("xx", "yy", "xy"), 3: ("xx", "yy", "zz", "yz", "xz", "xy")}
+"""Components of symmetric tensors and of strains of the box, in Voigt's order, by dimension."""
+
 # Relative size of entries that rounding leaves when a program rotates a box forth and back.
 _ROUNDING = 1e-13
 

@@ -30,12 +30,13 @@ from jamshape.files.layout import read_frame, version, write_particles
 from jamshape.files.vocabulary import FORMAT_VERSION, require_format
 from jamshape.landscape import Landscape, State
 from jamshape.packing import Packing
+from jamshape.packing.box import COMPONENTS
 from jamshape.vibration.elasticity import Moduli, moduli
 from jamshape.vibration.hessian import LARGEST_RESIDUAL, Coordinates, DynamicalMatrix
 from jamshape.vibration.spectrum import Spectrum, state_error
 from jamshape.vibration.stability import Eigenvalue
 from jamshape.vibration.statistics import bands, components, count, participation, why_no_bands
-from jamshape.vibration.tensors import COMPONENTS, ElasticTensor, Modulus
+from jamshape.vibration.tensors import ElasticTensor, Modulus
 
 if TYPE_CHECKING:
     import h5py

@@ -20,10 +20,7 @@ import numpy as np
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.checks import require_one_of
-
-COMPONENTS = {2: ("xx", "yy", "xy"), 3: ("xx", "yy", "zz", "yz", "xz", "xy")}
-"""Order of the components, by dimension."""
-
+from jamshape.packing.box import COMPONENTS
 
 _Function = Callable[[FloatArray], float]
 

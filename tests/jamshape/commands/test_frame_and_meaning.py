@@ -77,9 +77,11 @@ def test_another_frame_is_another_run(dump, tmp_path):
         (js.cyclic_shear, True, "--shape dimer --frame 2", "has 2 frames, expected frame 2"),
     ],
 )  # fmt: skip
-def test_what_contradicts_a_start_or_lacks_one_is_refused(dump, function, has_start, words, said):
+def test_what_contradicts_a_start_or_lacks_one_is_refused(
+    dump, tmp_path, function, has_start, words, said
+):
     with pytest.raises(ValueError, match="expected") as error:
-        typed(function, dump if has_start else None, f"{words} --out no.h5")
+        typed(function, dump if has_start else None, f"{words} --out {tmp_path / 'no.h5'}")
     assert re.search(said, getattr(error.value, "with_options", str(error.value)))
 
 
@@ -87,4 +89,6 @@ def test_what_contradicts_a_start_or_lacks_one_is_refused(dump, function, has_st
 def test_a_file_that_states_another_shape_is_not_reread(tmp_path, function):
     DIMERS.save(tmp_path / "dimers.h5")
     with pytest.raises(ValueError, match="has shape dimer, expected superellipsoid"):
-        typed(function, tmp_path / "dimers.h5", "--shape superellipsoid --out no.h5")
+        typed(
+            function, tmp_path / "dimers.h5", f"--shape superellipsoid --out {tmp_path / 'no.h5'}"
+        )

@@ -10,8 +10,9 @@ import jamshape as js
 from jamshape.checks import ArgumentError
 from jamshape.landscape import CrossingError, Landscape, State
 from jamshape.minima import Stop, minimise
-from jamshape.minima.boxes import COMPONENTS, Settling, Yielding, advance, strains_of
+from jamshape.minima.boxes import Settling, Yielding, advance, strains_of
 from jamshape.minima.target import TargetError
+from jamshape.packing.box import COMPONENTS
 
 SCENES = {
     "discs": (js.Spherocylinders(alpha=0), 24, 2),

@@ -13,12 +13,13 @@ from test_elasticity import floppy
 import jamshape as js
 from jamshape.landscape import Landscape, State
 from jamshape.minima import Stop, minimise
+from jamshape.packing.box import COMPONENTS
 from jamshape.vibration import stability
 from jamshape.vibration.elasticity import moduli
 from jamshape.vibration.hessian import dynamical_matrix
 from jamshape.vibration.spectrum import spectrum
 from jamshape.vibration.stability import BorderedMatrix, softest_of, stability_of
-from jamshape.vibration.tensors import COMPONENTS, ElasticTensor, strains_of
+from jamshape.vibration.tensors import ElasticTensor, strains_of
 
 # --- crystals --------------------------------------------------------------------------------------
 
