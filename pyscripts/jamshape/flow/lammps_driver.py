@@ -61,8 +61,7 @@ def plan(
     def restore(first: Packing, checkpoint: Checkpoint) -> LammpsDriver:
         return driver(first, settings, sizes, checkpoint or None)
 
-    own = {name: value for name, value in dataclasses.asdict(settings).items() if value is not None}
-    told = own | dict(made_from) | dataclasses.asdict(sizes)
+    told = dataclasses.asdict(settings) | dict(made_from) | dataclasses.asdict(sizes)
     told["dt"] = told.pop("dt")  # may follow from the others
     return Plan(settings.name, f"a {settings.name}", told, begin, restore, _ARGUMENTS)
 
