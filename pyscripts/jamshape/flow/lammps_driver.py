@@ -151,9 +151,10 @@ class LammpsDriver:
         return self._kept
 
     def results(self) -> dict[str, Any]:
-        """Return what LAMMPS left out, and its version."""
+        """Return what LAMMPS left out, its version, and times of a box that yields."""
         session = self._session
-        return {"left_out": session.left_out(), "lammps_version": session.version}
+        own = {"left_out": session.left_out(), "lammps_version": session.version}
+        return own | self._run.times()
 
     def close(self) -> None:
         """End LAMMPS."""

@@ -43,14 +43,14 @@ class Shearing(Motion):
     hold_pressure
         Normal pressure p_yy that the height of the box holds, [energy / length^D]; None holds the volume.
     t_box
-        Time in which the height relaxes, [time]; with a pressure.
+        Time in which the height relaxes, [time]; with a pressure. That of `fix overdamped/affine` if None.
 
     Others as in `Motion`.
 
     Raises
     ------
     ValueError
-        If the flow is unknown or drives a height that yields, a pressure comes without its time, the box would shear by more
+        If the flow is unknown or drives a height that yields, a time comes without its pressure, the box would shear by more
         than 0.01 in a time step, or as `Motion`.
     """
 
@@ -78,15 +78,16 @@ class Shearing(Motion):
             raise ValueError(msg)
 
     def _take_pressure(self) -> None:
-        if self.hold_pressure is not None and self.t_box is not None:
-            require_positive(hold_pressure=self.hold_pressure, t_box=self.t_box)
-            object.__setattr__(self, "hold_pressure", float(self.hold_pressure))
-            object.__setattr__(self, "t_box", float(self.t_box))
-            if self.flow != "simple":
-                msg = f"flow {self.flow} drives the height of the box, which a pressure needs, expected flow simple or no pressure"
-                raise ValueError(msg)
-        elif self.hold_pressure is not None or self.t_box is not None:
-            msg = f"pressure {self.hold_pressure} and t_box {self.t_box}, expected both or neither"
+        given = {"hold_pressure": self.hold_pressure, "t_box": self.t_box}
+        given = {name: value for name, value in given.items() if value is not None}
+        require_positive(**given)
+        for name, value in given.items():
+            object.__setattr__(self, name, float(value))
+        if given.keys() == {"t_box"}:
+            msg = f"t_box {self.t_box} without a pressure, expected both or no time"
+            raise ValueError(msg)
+        if given and self.flow != "simple":
+            msg = f"flow {self.flow} drives the height of the box, which a pressure needs, expected flow simple or no pressure"
             raise ValueError(msg)
 
     @property
@@ -102,11 +103,16 @@ class Shearing(Motion):
     @property
     def control(self) -> str:
         """Controlled stress in the syntax of `fix overdamped/affine`."""
-        return (
-            ""
-            if self.hold_pressure is None
-            else f" stress yy {self.hold_pressure!r} tbox {self.t_box!r}"
-        )
+        if self.hold_pressure is None:
+            return ""
+        time = "" if self.t_box is None else f" tbox {self.t_box!r}"
+        return f" stress yy {self.hold_pressure!r}{time}"
+
+    def times(self, box: float, viscosity: float) -> dict[str, float]:
+        """Return the times of the box and of the packing, where a pressure is held."""
+        if self.hold_pressure is None:
+            return {}
+        return {"box_time": box, "relaxation_time": viscosity / self.hold_pressure}
 
     def stresses(
         self, found: Mapping[str, float], second: float, dimension: int

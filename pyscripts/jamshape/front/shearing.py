@@ -87,7 +87,8 @@ def shear(
     pressure : float, [energy / length^D]
         Normal pressure p_yy to hold in simple shear, to which the height of the box yields; 0 holds the volume.
     t_box : float, [time], optional
-        Time in which the height of the box relaxes, with a pressure; 0.01 / gdot by default, a strain of 0.01, but at least 1.
+        Time in which the height of the box relaxes, with a pressure. By default the height follows as fast as a packing at
+        this pressure relaxes, in about k_d d^2 / p.
     seed : int, optional
         Random seed of the start; 1 by default.
     start : Packing or path, optional
@@ -145,7 +146,7 @@ def shear(
     at = place(file, "shear.h5")
     whole = dt is None and sides == 2
     integrator = integrator or _usual(gdot, of.dimension, whole=whole, yields=pressure > 0)
-    held = _held(pressure, t_box, gdot, flow, integrator)
+    held = _held(pressure, t_box, flow, integrator)
     if integrator in METHODS:
         require_no_effect("integrator", integrator, dt=dt, frames=frames)
         longest = min(SlowShear.largest_strain, strain / rows)
@@ -271,7 +272,7 @@ def cyclic_shear(
     of = Start.of(particles, Asked(n, phi, seed, dimension), start, usual_phi=0.8, sides=sides, phi_name=_PHI_NAME)  # fmt: skip
     at = place(file, "cycles.h5")
     integrator = integrator or ("heun" if dt is not None or sides == 1 else "rkc2")
-    held = _held(pressure, t_box, QUARTERS * amplitude / period, flow, integrator)
+    held = _held(pressure, t_box, flow, integrator)
     longest = longest_step(amplitude, period)
     if integrator == "heun":
         require_no_effect("integrator", integrator, integration_tolerance=integration_tolerance)
@@ -431,8 +432,8 @@ def _usual(gdot: float, dimension: int, *, whole: bool, yields: bool) -> str:
 
 
 def _held(
-    pressure: float, t_box: float | None, gdot: float, flow: str, integrator: str
-) -> dict[str, float]:
+    pressure: float, t_box: float | None, flow: str, integrator: str
+) -> dict[str, float | None]:
     """Return the settings of a pressure to hold, none without one, and refuse what does not go with it."""
     if not pressure:
         require_no_effect("pressure", pressure, t_box=t_box)
@@ -443,7 +444,7 @@ def _held(
     if flow != "simple":
         said = "{flow} shear drives the height of the box, expected simple shear with a pressure"
         raise ArgumentError(said, {"flow": flow})
-    return {"hold_pressure": pressure, "t_box": max(1.0, 0.01 / gdot) if t_box is None else t_box}
+    return {"hold_pressure": pressure, "t_box": t_box}
 
 
 def _require_cycle(amplitude: float, period: float, rows: int) -> None:

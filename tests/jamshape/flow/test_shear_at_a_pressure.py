@@ -31,6 +31,19 @@ def test_the_normal_pressure_is_held_and_the_height_follows(tmp_path):
     assert run.about["hold_pressure"] == 1e-2
 
 
+def test_the_default_time_does_not_decide_how_the_height_follows(tmp_path, measured):
+    """A faster box gives the same phi; one with 0.01 / gdot would not have followed at this rate and pressure."""
+    how = {"n": 64, "phi": 0.8, "gdot": 1e-4, "strain": 0.1, "pressure": 1e-4, "rows": 20, "progress": False}  # fmt: skip
+    usual = js.shear(DISCS, file=tmp_path / "usual.h5", **how)
+    time = usual.about["box_time"]
+    fast, slow = (js.shear(DISCS, t_box=factor * time, **how) for factor in (0.1, 60))
+    change = fast.phi[-1] - fast.phi[0]
+    measured(fast=abs((usual.phi - fast.phi) / change).max())
+    assert np.abs(usual.phi - fast.phi).max() < 0.15 * abs(change)
+    assert np.abs(slow.phi - fast.phi).max() > 0.6 * abs(change)
+    assert usual.about["relaxation_time"] == pytest.approx(usual.packing().measures.mean() * 4 / np.pi / 1e-4, rel=1e-6)  # fmt: skip
+
+
 def test_a_volume_that_is_held_records_what_it_did(tmp_path):
     run = js.shear(DISCS, n=24, phi=0.8, gdot=1e-2, strain=0.2, rows=10, file=tmp_path / "run.h5", progress=False)  # fmt: skip
     assert "p_yy" not in run.observables
@@ -142,4 +155,6 @@ def test_the_command_cycles_at_a_pressure(tmp_path):
     said = jamshape(*words).out
     assert len(json.loads(said.splitlines()[-1])["per_cycle"]) == 2
     assert jamshape(*words).out == said
-    assert "at pressure 0.01" in jamshape("info", file).out
+    said = jamshape("info", file).out
+    assert "at pressure 0.01, where the box relaxes in 1.7" in said
+    assert "and packings in about 148" in said
