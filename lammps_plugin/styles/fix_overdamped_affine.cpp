@@ -99,7 +99,10 @@ void FixOverdampedAffine::fail(const std::string &found_and_expected) const
 
 FixOverdampedAffine::Command FixOverdampedAffine::read(int narg, char **arg)
 {
-  if (igroup != 0) fail("a group other than all, expected 'all': the whole box moves.");
+  if (igroup != 0) {
+    fail("a group other than all, expected 'all', since the whole box moves: hold particles at "
+         "rest in the host by 'fix setforce 0 0 0' or 'fix freeze' on their group.");
+  }
   if (narg < 5 || std::strcmp(arg[3], "drag")) {
     fail(std::string("wrong arguments, expected ") + SYNTAX);
   }

@@ -205,7 +205,7 @@ def test_normal_pressure_is_held_in_a_long_shear_across_flips(
     assert mean == pytest.approx(1, abs=0.1)
 
 
-def balance_of_power(packing, dt, folder):
+def balance_of_power(packing, dt, folder, before=""):
     """Energy from the power less that of the state, over the work of the stress, from time 1 to 3.
 
     dU/dt = -V P:G - sum torque.w_host - what the drag takes; V, P and G change all the time. Rows are of every step, since contacts
@@ -214,7 +214,7 @@ def balance_of_power(packing, dt, folder):
     p, t_box, g, steps = 0.05, 30.0, 2e-3, round(2 / dt)
     rows = []
     with loaded(packing, folder, sides="two") as session:
-        session.commands(f"{TILT}\n{fix(f'shear {g} stress yy {p} tbox {t_box}', dt)}\n{STRESSES}")
+        session.commands(f"{TILT}\n{before}\n{fix(f'shear {g} stress yy {p} tbox {t_box}', dt)}\n{STRESSES}")
         session.commands(f"thermo_style custom step pe vol c_stress[1]\nthermo_modify norm no\nrun {steps // 2}\nrun 0")  # fmt: skip
         for _ in range(steps + 1):
             P, volume = tensor(session), session.lmp.get_thermo("vol")
@@ -238,6 +238,48 @@ def test_power_balances_in_a_box_that_yields(name, dt, goal, start, tmp_path, me
     measured(balance=abs(fine), order=order)
     assert abs(fine) < goal
     assert order == pytest.approx(2, abs=0.25)
+
+
+# --- particles that are held ----------------------------------------------------------------------
+
+
+HELD = "group held id 1:5\nfix hold held "
+
+
+def from_center(packing):
+    box = packing.box
+    return packing.position + packing.image @ box.matrix.T - box.center
+
+
+@pytest.mark.parametrize("how", ["setforce 0 0 0", "freeze"])
+def test_held_particles_move_with_the_box_and_their_contacts_count(how, start, tmp_path, measured):
+    packing, p = start("rods"), 0.02
+    with loaded(packing, tmp_path, sides="two") as session:
+        control = fix(f"{all_stresses(2, p)} tbox 20", 20.0, "integrator rkc2 tolerance 1e-3")
+        session.commands(f"{TILT}\n{HELD}{how}\n{control}\n{STRESSES}\nrun 1000")
+        error = np.abs(tensor(session) - p * np.eye(2)).max() / p
+        end = state_of(session, packing).packing
+    measured(stress=error)
+    assert error < 1e-6
+    deformation = end.box.matrix @ np.linalg.inv(packing.box.matrix)
+    moved = from_center(end) - from_center(packing) @ deformation.T
+    assert np.abs(moved[:5]).max() < 1e-13
+    assert np.abs(moved[5:]).max() > 1e-2
+
+
+def test_power_balances_with_held_particles(start, tmp_path, measured):
+    found = balance_of_power(start("rods"), 0.005, tmp_path, f"{HELD}setforce 0 0 0")
+    measured(balance=abs(found))
+    assert abs(found) < 1e-6
+
+
+def test_a_group_left_out_of_the_fix_is_refused(start, tmp_path):
+    text = f"{scene(start('discs'), tmp_path / 'scene.data')}\ngroup few id 2:9\n"
+    text += "fix drive few overdamped/affine drag 1.0 pressure iso 1e-2 1e-2"
+    assert refusal_of(text) == (
+        "fix overdamped/affine found a group other than all, expected 'all', since the whole box moves: hold particles at rest"
+        " in the host by 'fix setforce 0 0 0' or 'fix freeze' on their group."
+    )
 
 
 # --- targets -------------------------------------------------------------------------------------
