@@ -75,11 +75,14 @@ def figure(times: list[dict[str, float]], shears: dict[float, js.ShearFile]) -> 
     for k, alpha in enumerate(sorted({one["alpha"] for one in times})):
         of = [one for one in times if one["alpha"] == alpha]
         p = [one["p"] for one in of]
-        left.errorbar(
-            p, [one["slowest"] for one in of], label=rf"$\alpha={alpha:g}$", **marked(k)
-        )
+        left.errorbar(p, [one["slowest"] for one in of], label=rf"$\alpha={alpha:g}$", **marked(k))
         left.plot(p, [one["expected"] for one in of], color=color(k), lw=1)
-    left.set(xscale="log", yscale="log", xlabel="pressure $p$", ylabel="slowest relaxation time; line: $k_d d^2/p$")
+    left.set(
+        xscale="log",
+        yscale="log",
+        xlabel="pressure $p$",
+        ylabel="slowest relaxation time; line: $k_d d^2/p$",
+    )
     for factor, made in shears.items():
         right.plot(made.strain, made.phi, lw=1, label=rf"${factor:g}\,t_\mathrm{{box}}$")
     right.set(xlabel=r"strain $\gamma$", ylabel=r"packing fraction $\phi$")

@@ -159,7 +159,7 @@ DRIVERS = {
     "compression in LAMMPS": Case(
         "compress", RODS,
         {"n": 16, "phi": (0.5, 0.86), "kappa": 1e-3, **_ROWS},
-        {"n": 17, "phi": (0.5, 0.87), "kappa": 2e-3, "seed": 2, "rows": 41, "frames": 4,
+        {"n": 17, "phi": (0.5, 0.87), "kappa": 2e-3, "p_end": 0.5, "seed": 2, "rows": 41, "frames": 4,
          "integrator": "heun/adaptive", "integration_tolerance": 1e-3, "sides": 1},
         {"kappa": 1e-6, "rows": 100_000},
     ),
@@ -209,6 +209,9 @@ DRIVERS = {
 CASES = DRIVERS | {
     "compression by equal steps": Case(
         "compress", DIMERS, {"n": 16, "phi": (0.5, 0.86), "kappa": 1e-3, "dt": 0.1, **_ROWS}
+    ),
+    "compression to a pressure": Case(
+        "compress", DIMERS, {"n": 16, "phi": (0.5, 1.2), "kappa": 1e-3, "p_end": 2e-2, "rows": 80, "frames": 5}
     ),
     "compression of a mixture": Case(
         "compress", js.Spherocylinders(alpha=[0, 2], size=[1, 1.4]),

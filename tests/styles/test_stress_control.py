@@ -214,7 +214,9 @@ def balance_of_power(packing, dt, folder, before=""):
     p, t_box, g, steps = 0.05, 30.0, 2e-3, round(2 / dt)
     rows = []
     with loaded(packing, folder, sides="two") as session:
-        session.commands(f"{TILT}\n{before}\n{fix(f'shear {g} stress yy {p} tbox {t_box}', dt)}\n{STRESSES}")
+        session.commands(
+            f"{TILT}\n{before}\n{fix(f'shear {g} stress yy {p} tbox {t_box}', dt)}\n{STRESSES}"
+        )
         session.commands(f"thermo_style custom step pe vol c_stress[1]\nthermo_modify norm no\nrun {steps // 2}\nrun 0")  # fmt: skip
         for _ in range(steps + 1):
             P, volume = tensor(session), session.lmp.get_thermo("vol")

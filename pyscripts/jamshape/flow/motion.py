@@ -115,7 +115,7 @@ class Motion(ABC):
         return {}
 
     def times(self, box: float, viscosity: float) -> dict[str, float]:
-        """Times to report, from that in which the box relaxes and the viscosity of the host at the size of particles."""
+        """Return the times to report, from that in which the box relaxes and the viscosity of the host at the size of particles."""
         del box, viscosity
         return {}
 
@@ -137,6 +137,11 @@ class Motion(ABC):
         ValueError
             If the end is already passed.
         """
+
+    def is_over(self, found: Mapping[str, float]) -> bool:
+        """Whether observed values end the run before its last step."""
+        del found
+        return False
 
     @abstractmethod
     def where(self, found: Mapping[str, float]) -> str:

@@ -78,15 +78,14 @@ class Shearing(Motion):
             raise ValueError(msg)
 
     def _take_pressure(self) -> None:
-        given = {"hold_pressure": self.hold_pressure, "t_box": self.t_box}
-        given = {name: value for name, value in given.items() if value is not None}
-        require_positive(**given)
-        for name, value in given.items():
-            object.__setattr__(self, name, float(value))
-        if given.keys() == {"t_box"}:
+        for name in ("hold_pressure", "t_box"):
+            if (value := getattr(self, name)) is not None:
+                require_positive(**{name: value})
+                object.__setattr__(self, name, float(value))
+        if self.hold_pressure is None and self.t_box is not None:
             msg = f"t_box {self.t_box} without a pressure, expected both or no time"
             raise ValueError(msg)
-        if given and self.flow != "simple":
+        if self.hold_pressure is not None and self.flow != "simple":
             msg = f"flow {self.flow} drives the height of the box, which a pressure needs, expected flow simple or no pressure"
             raise ValueError(msg)
 

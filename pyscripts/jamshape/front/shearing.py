@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from jamshape.arguments import checked
 from jamshape.checks import (
@@ -266,7 +267,9 @@ def cyclic_shear(
     >>> bool(run.displacement[-1] < run.displacement[0])
     True
     """
-    require_stated(amplitude=amplitude, period=period, cycles=cycles, rows=rows, hold_pressure=pressure)
+    require_stated(
+        amplitude=amplitude, period=period, cycles=cycles, rows=rows, hold_pressure=pressure
+    )
     require_given(t_box=t_box, dt=dt, integration_tolerance=integration_tolerance, frames=frames)
     _require_cycle(amplitude, period, rows)
     of = Start.of(particles, Asked(n, phi, seed, dimension), start, usual_phi=0.8, sides=sides, phi_name=_PHI_NAME)  # fmt: skip
@@ -431,9 +434,7 @@ def _usual(gdot: float, dimension: int, *, whole: bool, yields: bool) -> str:
     return "tr-bdf2" if gdot <= _SLOW[dimension] and not yields else "rkc2"
 
 
-def _held(
-    pressure: float, t_box: float | None, flow: str, integrator: str
-) -> dict[str, float | None]:
+def _held(pressure: float, t_box: float | None, flow: str, integrator: str) -> dict[str, Any]:
     """Return the settings of a pressure to hold, none without one, and refuse what does not go with it."""
     if not pressure:
         require_no_effect("pressure", pressure, t_box=t_box)

@@ -78,7 +78,7 @@ def test_the_file_of_another_pressure_or_of_none_is_refused(shear, tmp_path):
     )
     shear(DISCS, pressure=1e-2, t_box=5.0, **how)
     for other in ({}, {"pressure": 2e-2, "t_box": 5.0}):
-        with pytest.raises(ValueError, match="with pressure=0.01, expected"):
+        with pytest.raises(ValueError, match=r"with pressure=0\.01, expected"):
             shear(DISCS, **how, **other)
 
 
@@ -121,7 +121,9 @@ def test_the_pressure_is_held_to_and_fro_and_the_width_stays(tmp_path):
     edges = np.array([frame.box.edges for frame in run])
     np.testing.assert_allclose(edges[:, 0], edges[0, 0], rtol=1e-14)
     assert np.abs(edges[1:, 1] / edges[0, 1] - 1).max() > 1e-3
-    assert repr(run).startswith("<Cyclic shear of 32 spherocylinders in 2D at p_yy = 0.01: 6 cycles")
+    assert repr(run).startswith(
+        "<Cyclic shear of 32 spherocylinders in 2D at p_yy = 0.01: 6 cycles"
+    )
     assert "p_{yy}=10^{-2}" in run.plot().get_title()
 
 
