@@ -48,7 +48,7 @@ class Cycles(NamedTuple):
     rows: int
     """Number of rows of a cycle."""
     held: str = ""
-    """What is held instead of the volume, for the title."""
+    """Pressure that is held instead of the volume, for the title."""
 
 
 def draw_cycles(axes: Axes, run: Cycles, system: System) -> None:
