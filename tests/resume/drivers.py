@@ -226,7 +226,7 @@ CASES = DRIVERS | {
     ),
     "cyclic shear in LAMMPS at a pressure": Case(
         "cyclic_shear", "rods",  # its box takes other cell vectors, to and fro
-        {"amplitude": 0.6, "period": 240.0, "cycles": 2, "rows": 12, "pressure": 1e-2, "t_box": 20.0},
+        {"amplitude": 0.6, "period": 240.0, "cycles": 2, "rows": 12, "pressure": 1e-2},
     ),
     "pure shear in LAMMPS": Case(
         "shear", "dimers", {"gdot": 1e-2, "strain": 0.5, "flow": "pure", "dt": 0.1, **_ROWS}

@@ -146,8 +146,8 @@ def test_at_rest_the_stress_is_the_target(name, goal, start, tmp_path, measured)
 @pytest.mark.parametrize("integrator", ["heun", "heun/adaptive", "rkc2"])
 @pytest.mark.parametrize("name", ["rods", "spheres"])
 def test_a_restart_changes_no_bit(name, integrator, start, tmp_path):
-    packing = start(name)
-    control = fix("shear 2e-2 stress yy 0.02 tbox 20", 0.05, f"integrator {integrator} flip 0.5")
+    packing, time = start(name), "tbox 20" if name == "rods" else ""
+    control = fix(f"shear 2e-2 stress yy 0.02 {time}", 0.05, f"integrator {integrator} flip 0.5")
     path = tmp_path / "half.restart"
     with loaded(packing, tmp_path, sides="two") as session:
         session.commands(f"{TILT}\n{control}\nrun 120\nwrite_restart {path}\nrun 120")
@@ -171,7 +171,7 @@ def test_two_ranks_agree_to_rounding(start, tmp_path, measured):
             f"""{load_plugin()}
             processors {ranks} 1 1
             {scene(packing, folder / "scene.data", sides="two")}
-            {fix("pressure iso 0.02 0.03 tbox 20", 0.05)}
+            {fix("pressure iso 0.02 0.03", 0.05)}
             {dump(folder / "end.dump", every=200)}
             run 200""",
             folder, ranks,
