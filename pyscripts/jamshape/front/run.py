@@ -482,9 +482,11 @@ class QuasistaticShearFile(Recorded):
             if step > 0 and (step - 1) % per_cycle == 0
         }
         done = (len(self.strain) - 1) // per_cycle
-        lost = self["lost"][1 : done * per_cycle + 1].reshape(done, per_cycle).sum(axis=1)
         p = self._how.hold_pressure
         yielding = Yielding(np.full(len(self.phi), p), 1 / self.phi) if p else None
+        volume = yielding.volume if yielding else np.ones(len(self.phi))
+        lost = (self["lost"] * volume)[1 : done * per_cycle + 1].reshape(done, per_cycle)
+        lost = lost.sum(axis=1) / volume[:-1:per_cycle][:done]
         rows = Rows(self.strain, self.stress, lost, per_cycle, yielding)
         return cycles_of(rows, Ends(kept, frames, rattlers=False), tolerance, first)
 
