@@ -45,9 +45,10 @@ double entry(const Upper &of, int k)
 
 }  // namespace
 
-BoxControl::BoxControl(LAMMPS_NS::LAMMPS *lmp) :
+BoxControl::BoxControl(LAMMPS_NS::LAMMPS *lmp, double k_d) :
     Pointers(lmp), box(nullptr), dimension(domain->dimension), rates{}, is_isotropic(false),
-    t_box(0.0), stiffness(0.0), measure(0.0), pair(nullptr), start{}, last{}, before{}
+    drag(k_d), is_time_given(false), t_box(NAN), stiffness(NAN), measure(NAN), pair(nullptr),
+    start{}, last{}, before{}
 {
 }
 
@@ -104,6 +105,7 @@ int BoxControl::read(int k, int narg, char **arg)
   if (!(t_box > 0.0) || !std::isfinite(t_box)) {
     wrong(std::string("tbox ") + arg[k + 1] + ", expected a positive time.");
   }
+  is_time_given = true;
   return 2;
 }
 
@@ -139,15 +141,11 @@ void BoxControl::require_complete(bool holds_volume) const
 {
   const bool changes_volume =
       is_isotropic || components[0].is_set || components[1].is_set || components[2].is_set;
-  if (!is_on() && t_box > 0.0) {
+  if (!is_on() && is_time_given) {
     wrong("tbox without a controlled stress, expected 'pressure' or 'stress': leave tbox out or "
           "give one.");
   }
   if (!is_on()) return;
-  if (!(t_box > 0.0)) {
-    wrong("a controlled stress without tbox, expected the time in which the box relaxes: "
-          "'tbox 100'.");
-  }
   if (holds_volume && changes_volume) {
     wrong("volume constant and a box that yields to a normal stress, expected 'volume free'.");
   }
@@ -171,6 +169,17 @@ void BoxControl::begin_run(PairContact &of)
     mine += of.drag(of.particle_view().semi_axes(i), atom->type[i]).measure;
   }
   MPI_Allreduce(&mine, &measure, 1, MPI_DOUBLE, MPI_SUM, world);
+  if (is_time_given) return;
+  // Single precision, so that it does not depend on the order of atoms.
+  const double mean = measure / static_cast<double>(atom->natoms);
+  t_box = static_cast<float>(host_viscosity() * mean / stiffness);
+}
+
+double BoxControl::host_viscosity() const
+{
+  const double mean = measure / static_cast<double>(atom->natoms);
+  const double d = dimension == 2 ? std::sqrt(4.0 * mean / M_PI) : std::cbrt(6.0 * mean / M_PI);
+  return static_cast<float>(drag * d * d);
 }
 
 void BoxControl::aim(Target &at, bool is_normal) const

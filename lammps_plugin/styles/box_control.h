@@ -13,9 +13,14 @@ namespace jamshape {
 /// G are driven at their rates. The contacts of N particles with the stiffness k_e have a bulk
 /// modulus of about k_e N / (D V), so that their pressure relaxes in about t_box. The deformation
 /// is exp(omega) times that at the start of a substep; omega takes the stages of the particles.
+///
+/// The slowest relaxation of a packing at the pressure p takes about k_d d^2 / p: the force p d on
+/// a particle, in 3D p d^2, moves it by its diameter d. The box alone would change by its own
+/// length under p in zeta / p. Both are equal, at any p, if zeta = k_d d^2: the default, with V the
+/// volume of the particles.
 class BoxControl : protected LAMMPS_NS::Pointers {
  public:
-  explicit BoxControl(LAMMPS_NS::LAMMPS *lmp);
+  BoxControl(LAMMPS_NS::LAMMPS *lmp, double k_d);
 
   /* set-up */
 
@@ -31,12 +36,17 @@ class BoxControl : protected LAMMPS_NS::Pointers {
   bool shears() const;
   /// Takes over the velocity gradient of the box.
   void yield(AffineBox &of);
-  /// Reads sizes and stiffness of the particles; at the start of a run.
+  /// Reads sizes and stiffness of the particles, on which the default time depends; at the start of
+  /// a run.
   void begin_run(PairContact &of);
   /// Sets the targets of the step of LAMMPS that ends at the present one.
   void aim();
 
   const Upper &driven() const { return rates; }
+  /// Time in which the box relaxes; NaN if that is the default, before the first run.
+  double time() const { return t_box; }
+  /// k_d d^2, d the diameter of a disc or sphere of the mean size; NaN before the first run.
+  double host_viscosity() const;
   /// Sets the velocity gradient to that of the contacts' present stress.
   void follow();
   /// Largest relaxation rate of the box alone: a bound, from the stiffness of all bonds.
@@ -68,6 +78,8 @@ class BoxControl : protected LAMMPS_NS::Pointers {
   bool is_isotropic;
   Target pressure;
   std::array<Target, 6> components;  // xx, yy, zz, xy, xz, yz
+  const double drag;
+  bool is_time_given;
   double t_box, stiffness, measure;
   PairContact *pair;
   Upper start, last, before;  // rate at the start of the substep; omega of the last two stages

@@ -38,7 +38,7 @@ constexpr double STRAIN_BETWEEN_CHECKS = 0.005;
 /// Largest strain of the box in one step of LAMMPS, so that output can resolve the motion.
 constexpr double LARGEST_STRAIN = 1.0;
 
-constexpr int N_OF_SUBSTEPS = 8, N_OF_FLOW = 4;
+constexpr int N_OF_SUBSTEPS = 8, N_OF_FLOW = 4, N_OF_CONTROL = 2;
 
 constexpr const char *SYNTAX =
     "'drag k_d [compress kappa] [shear gdot] [pure edot] [gradient ...] [pressure iso START STOP] "
@@ -99,16 +99,19 @@ void FixOverdampedAffine::fail(const std::string &found_and_expected) const
 
 FixOverdampedAffine::Command FixOverdampedAffine::read(int narg, char **arg)
 {
-  if (igroup != 0) fail("a group other than all, expected 'all': the whole box moves.");
+  if (igroup != 0) {
+    fail("a group other than all, expected 'all', since the whole box moves: hold particles at "
+         "rest in the host by 'fix setforce 0 0 0' or 'fix freeze' on their group.");
+  }
   if (narg < 5 || std::strcmp(arg[3], "drag")) {
     fail(std::string("wrong arguments, expected ") + SYNTAX);
   }
   Command command;
-  control = std::make_unique<BoxControl>(lmp);
   command.k_d = number(arg[4]);
   if (!(command.k_d > 0.0) || !std::isfinite(command.k_d)) {
     fail(std::string("drag ") + arg[4] + ", expected a positive number.");
   }
+  control = std::make_unique<BoxControl>(lmp, command.k_d);
   for (int k = 5; k < narg;) {
     int taken = read_flow(k, narg, arg, command);
     if (taken == 0) taken = read_control(k, narg, arg);
@@ -304,7 +307,7 @@ void FixOverdampedAffine::tell_what_this_is()
   maxexchange = flow->width();
   comm_forward = flow->width();
   vector_flag = 1;
-  size_vector = 8 + N_OF_SUBSTEPS + N_OF_FLOW;
+  size_vector = 8 + N_OF_SUBSTEPS + N_OF_FLOW + N_OF_CONTROL;
   global_freq = 1;
   extvector = 0;
 }
@@ -634,6 +637,10 @@ double FixOverdampedAffine::compute_vector(int n)
       return flow->mean_turn();
     case 19:
       return flow->knows_particles() ? flow->power_of_host() : NAN;
+    case 20:
+      return control ? control->time() : 0.0;
+    case 21:
+      return control ? control->host_viscosity() : 0.0;
     default:
       return of_substeps(n - 8);
   }

@@ -28,7 +28,7 @@ namespace jamshape {
 /// and of the last step of LAMMPS the shortest substep, largest local error and most stages; the
 /// mean overlap length that errors are relative to; then the strains of simple and of pure shear,
 /// the mean rotation of particles about z, and the power of torques on the rotation due to the host
-/// alone.
+/// alone; of a box that yields, its time and the viscosity of the host, k_d d^2.
 class FixOverdampedAffine : public LAMMPS_NS::Fix {
  public:
   FixOverdampedAffine(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg);

@@ -59,6 +59,7 @@ FILES = [
     Told("README.md", "create_random", "rods.in"),
     Told("docs/how-to/decks.md", "create_random spherocylinder", "rods.in"),
     Told("docs/how-to/your-own-states.md", "create_random spherocylinder", "own.in"),
+    Told("docs/how-to/stress.md", "create_random spherocylinder", "ramp.in"),
 ]
 """Blocks that the page tells its reader to keep in a file."""
 

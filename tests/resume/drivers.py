@@ -159,7 +159,7 @@ DRIVERS = {
     "compression in LAMMPS": Case(
         "compress", RODS,
         {"n": 16, "phi": (0.5, 0.86), "kappa": 1e-3, **_ROWS},
-        {"n": 17, "phi": (0.5, 0.87), "kappa": 2e-3, "seed": 2, "rows": 41, "frames": 4,
+        {"n": 17, "phi": (0.5, 0.87), "kappa": 2e-3, "p_end": 0.5, "seed": 2, "rows": 41, "frames": 4,
          "integrator": "heun/adaptive", "integration_tolerance": 1e-3, "sides": 1},
         {"kappa": 1e-6, "rows": 100_000},
     ),
@@ -210,6 +210,9 @@ CASES = DRIVERS | {
     "compression by equal steps": Case(
         "compress", DIMERS, {"n": 16, "phi": (0.5, 0.86), "kappa": 1e-3, "dt": 0.1, **_ROWS}
     ),
+    "compression to a pressure": Case(
+        "compress", DIMERS, {"n": 16, "phi": (0.5, 1.2), "kappa": 1e-3, "p_end": 2e-2, "rows": 80, "frames": 5}
+    ),
     "compression of a mixture": Case(
         "compress", js.Spherocylinders(alpha=[0, 2], size=[1, 1.4]),
         {"n": 16, "phi": (0.5, 0.86), "kappa": 1e-3, "sides": 1, "integrator": "heun/adaptive", **_ROWS},
@@ -220,6 +223,10 @@ CASES = DRIVERS | {
     "shear in space": Case("shear", "bodies", {"gdot": 1e-2, "strain": 0.9, **_ROWS}),
     "shear in LAMMPS at a pressure": Case(
         "shear", "rods", {"gdot": 1e-2, "strain": 1.2, "pressure": 1e-2, "t_box": 20.0, **_ROWS}
+    ),
+    "cyclic shear in LAMMPS at a pressure": Case(
+        "cyclic_shear", "rods",  # its box takes other cell vectors, to and fro
+        {"amplitude": 0.6, "period": 240.0, "cycles": 2, "rows": 12, "pressure": 1e-2},
     ),
     "pure shear in LAMMPS": Case(
         "shear", "dimers", {"gdot": 1e-2, "strain": 0.5, "flow": "pure", "dt": 0.1, **_ROWS}

@@ -91,3 +91,18 @@ def test_errors_of_boxes_fall(report, tmp_path):
     for curve in found["curves"]:
         assert curve["error"][-1] < 1e-8
         assert np.all(np.diff(curve["seconds"]) > 0)
+
+
+def test_a_slow_box_lags_and_times_are_reported(report, tmp_path):
+    found = report(
+        "stress/box_time.py", "--n", 12, "--samples", 1, "--alphas", 1, "--pressures", 1e-2, 1e-3, "--gdot", 1e-3,
+        "--strain", 2, "--factors", 1, 1000, "--runs", tmp_path / "runs", "--out", tmp_path / "p.png",
+    )  # fmt: skip
+    high, low = found["times"]
+    assert low["expected"] == pytest.approx(10 * high["expected"])
+    assert 0 < high["slowest"] < 10 * high["expected"]
+    usual, slow = found["shears"]
+    assert slow["t_box"] == pytest.approx(1000 * usual["t_box"])
+    assert slow["spread_over_p"] > 0
+    assert abs(usual["p_yy_over_p"] - 1) < 0.3
+    assert (tmp_path / "p.png").stat().st_size > 1e4

@@ -169,7 +169,7 @@ SYNTAX = (
         (f"{FIX} check -1", "check -1, expected a number of steps, or 0 for never."),
         (
             f"group one id 1\n{FIX.replace('all', 'one')}",
-            "a group other than all, expected 'all': the whole box moves.",
+            "a group other than all, expected 'all', since the whole box moves: hold particles at rest in the host by 'fix setforce 0 0 0' or 'fix freeze' on their group.",
         ),
     ],
 )

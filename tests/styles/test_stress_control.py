@@ -19,8 +19,10 @@ from lammps_runs import (
     states_from_dump,
 )
 from lammps_scenes import dense, pose_differences, rods
-from scipy.integrate import solve_ivp
+from scipy.integrate import simpson, solve_ivp
 from superellipsoid_scenes import crowd
+
+import jamshape as js
 
 pytestmark = pytest.mark.lammps
 
@@ -94,6 +96,7 @@ PACKINGS = {
     "discs": lambda: dense(alpha=0.0, n=32, phi=0.9),
     "rods": lambda: dense(n=24, phi=0.95),
     "spheres": lambda: dense(3, alpha=0.0, n=32, phi=0.7),
+    "ellipsoids": lambda: crowd(3, kinds=(1,)),
     "superellipsoids": lambda: crowd(3),
 }
 
@@ -143,8 +146,8 @@ def test_at_rest_the_stress_is_the_target(name, goal, start, tmp_path, measured)
 @pytest.mark.parametrize("integrator", ["heun", "heun/adaptive", "rkc2"])
 @pytest.mark.parametrize("name", ["rods", "spheres"])
 def test_a_restart_changes_no_bit(name, integrator, start, tmp_path):
-    packing = start(name)
-    control = fix("shear 2e-2 stress yy 0.02 tbox 20", 0.05, f"integrator {integrator} flip 0.5")
+    packing, time = start(name), "tbox 20" if name == "rods" else ""
+    control = fix(f"shear 2e-2 stress yy 0.02 {time}", 0.05, f"integrator {integrator} flip 0.5")
     path = tmp_path / "half.restart"
     with loaded(packing, tmp_path, sides="two") as session:
         session.commands(f"{TILT}\n{control}\nrun 120\nwrite_restart {path}\nrun 120")
@@ -168,7 +171,7 @@ def test_two_ranks_agree_to_rounding(start, tmp_path, measured):
             f"""{load_plugin()}
             processors {ranks} 1 1
             {scene(packing, folder / "scene.data", sides="two")}
-            {fix("pressure iso 0.02 0.03 tbox 20", 0.05)}
+            {fix("pressure iso 0.02 0.03", 0.05)}
             {dump(folder / "end.dump", every=200)}
             run 200""",
             folder, ranks,
@@ -202,34 +205,83 @@ def test_normal_pressure_is_held_in_a_long_shear_across_flips(
     assert mean == pytest.approx(1, abs=0.1)
 
 
-FIRST_ORDER = pytest.mark.xfail(
-    reason="2.4e-5 at this step and 1.06e-5 at half of it, of first order though the motion is of second: not understood",
-    strict=True,
-)
+def balance_of_power(packing, dt, folder, before=""):
+    """Energy from the power less that of the state, over the work of the stress, from time 1 to 3.
 
-
-@pytest.mark.parametrize("name", ["rods", pytest.param("superellipsoids", marks=[pytest.mark.validate, FIRST_ORDER])])  # fmt: skip
-def test_power_balance_in_a_box_that_yields(name, start, tmp_path, measured):
-    """dU/dt = -V P:G - sum torque.w_host - what the drag takes; V, P and G change all the time."""
-    packing, p, t_box, every, dt, g = start(name), 0.05, 30.0, 2, 0.0025, 2e-3
+    dU/dt = -V P:G - sum torque.w_host - what the drag takes; V, P and G change all the time. Rows are of every step, since contacts
+    open and close between rows that are farther apart, and both times are those of every dt, since the start is a fast transient.
+    """
+    p, t_box, g, steps = 0.05, 30.0, 2e-3, round(2 / dt)
     rows = []
-    with loaded(packing, tmp_path, sides="two") as session:
-        session.commands(f"{TILT}\n{fix(f'shear {g} stress yy {p} tbox {t_box}', dt)}\n{STRESSES}")
-        session.commands("thermo_style custom step pe vol c_stress[1]\nthermo_modify norm no\nrun 400\nrun 0")  # fmt: skip
-        for _ in range(801):
+    with loaded(packing, folder, sides="two") as session:
+        session.commands(
+            f"{TILT}\n{before}\n{fix(f'shear {g} stress yy {p} tbox {t_box}', dt)}\n{STRESSES}"
+        )
+        session.commands(f"thermo_style custom step pe vol c_stress[1]\nthermo_modify norm no\nrun {steps // 2}\nrun 0")  # fmt: skip
+        for _ in range(steps + 1):
             P, volume = tensor(session), session.lmp.get_thermo("vol")
             yy = (P[1, 1] - p) * volume / (t_box * packing.n)
             work = -volume * (P[0, 1] * g + P[1, 1] * yy)
             lost = fix_vector(session, "drive", 5) + fix_vector(session, "drive", 20)
             rows.append((session.lmp.get_thermo("pe"), work, lost))
-            session.commands(f"run {every} post no")
+            session.commands("run 1 post no")
     energy, work, lost = np.array(rows).T
-    weights = np.ones(len(rows))
-    weights[1:-1:2], weights[2:-1:2] = 4, 2
-    integral = (work - lost) @ weights * dt * every / 3
-    error = abs(energy[-1] - energy[0] - integral) / (np.abs(work) @ weights * dt * every / 3)
-    measured(balance=error)
-    assert error < 1e-5
+    integral, scale = (simpson(each, dx=dt) for each in (work - lost, np.abs(work)))
+    return (energy[-1] - energy[0] - integral) / scale
+
+
+@pytest.mark.parametrize(
+    ("name", "dt", "goal"),
+    [("rods", 0.01, 1e-6), ("ellipsoids", 0.01, 2e-4), pytest.param("superellipsoids", 0.0025, 1e-5, marks=pytest.mark.validate)],
+)  # fmt: skip
+def test_power_balances_in_a_box_that_yields(name, dt, goal, start, tmp_path, measured):
+    coarse, fine = (balance_of_power(start(name), step, tmp_path) for step in (dt, dt / 2))
+    order = np.log2(coarse / fine)
+    measured(balance=abs(fine), order=order)
+    assert abs(fine) < goal
+    assert order == pytest.approx(2, abs=0.25)
+
+
+# --- particles that are held ----------------------------------------------------------------------
+
+
+HELD = "group held id 1:5\nfix hold held "
+
+
+def from_center(packing):
+    box = packing.box
+    return packing.position + packing.image @ box.matrix.T - box.center
+
+
+@pytest.mark.parametrize("how", ["setforce 0 0 0", "freeze"])
+def test_held_particles_move_with_the_box_and_their_contacts_count(how, start, tmp_path, measured):
+    packing, p = start("rods"), 0.02
+    with loaded(packing, tmp_path, sides="two") as session:
+        control = fix(f"{all_stresses(2, p)} tbox 20", 20.0, "integrator rkc2 tolerance 1e-3")
+        session.commands(f"{TILT}\n{HELD}{how}\n{control}\n{STRESSES}\nrun 1000")
+        error = np.abs(tensor(session) - p * np.eye(2)).max() / p
+        end = state_of(session, packing).packing
+    measured(stress=error)
+    assert error < 1e-6
+    deformation = end.box.matrix @ np.linalg.inv(packing.box.matrix)
+    moved = from_center(end) - from_center(packing) @ deformation.T
+    assert np.abs(moved[:5]).max() < 1e-13
+    assert np.abs(moved[5:]).max() > 1e-2
+
+
+def test_power_balances_with_held_particles(start, tmp_path, measured):
+    found = balance_of_power(start("rods"), 0.005, tmp_path, f"{HELD}setforce 0 0 0")
+    measured(balance=abs(found))
+    assert abs(found) < 1e-6
+
+
+def test_a_group_left_out_of_the_fix_is_refused(start, tmp_path):
+    text = f"{scene(start('discs'), tmp_path / 'scene.data')}\ngroup few id 2:9\n"
+    text += "fix drive few overdamped/affine drag 1.0 pressure iso 1e-2 1e-2"
+    assert refusal_of(text) == (
+        "fix overdamped/affine found a group other than all, expected 'all', since the whole box moves: hold particles at rest"
+        " in the host by 'fix setforce 0 0 0' or 'fix freeze' on their group."
+    )
 
 
 # --- targets -------------------------------------------------------------------------------------
@@ -250,15 +302,54 @@ def test_targets_may_be_variables_and_ramps(tmp_path):
     np.testing.assert_allclose(ramp, exact, atol=2e-7)
 
 
-@pytest.mark.parametrize(("p", "goal"), [(1e-8, 0.3), (1e-4, 1e-2), (1e-1, 1e-2)])
-def test_pressures_of_all_sizes(p, goal, start, tmp_path):
-    """The last approach to jamming is slow: contacts open and close."""
-    with loaded(start("discs"), tmp_path, sides="two") as session:
-        session.commands(
-            f"{fix(f'pressure iso {p} {p} tbox 20', 1e4, 'integrator rkc2 tolerance 1e-3')}\n{STRESSES}"
-        )
-        session.commands("run 150")
-        assert global_vector(session, "stress")[2] == pytest.approx(p, rel=goal)
+def diameter(packing):
+    """That of a disc or sphere of the mean size."""
+    mean, D = packing.measures.mean(), packing.dimension
+    return (2 * D * mean / np.pi) ** (1 / D)
+
+
+@pytest.mark.parametrize("name", ["discs", "rods", "superellipsoids"])
+def test_without_tbox_the_box_strains_under_p_as_fast_as_a_packing_relaxes(name, start, tmp_path):
+    """By p alone at the rate p / zeta = p / (k_d d^2), where the packing fraction is 1."""
+    packing, k_d, k_e, p = start(name), 3.0, 2.0, 0.02
+
+    def moved(tbox):
+        with loaded(packing, tmp_path, sides="two", k_e=k_e) as session:
+            session.commands(f"fix drive all overdamped/affine drag {k_d} pressure iso {p} {p} {tbox}\ntimestep 0.01\nrun 20")  # fmt: skip
+            told = [fix_vector(session, "drive", k) for k in (21, 22)]
+            return told, state_of(session, packing).packing.box.edges
+
+    told, edges = moved("")
+    time, viscosity = told
+    assert viscosity == pytest.approx(k_d * diameter(packing) ** 2, rel=1e-6)
+    zeta = time * k_e / packing.measures.mean()
+    assert zeta == pytest.approx(viscosity, rel=1e-6)
+    again, same = moved(f"tbox {time!r}")
+    assert again == told
+    np.testing.assert_array_equal(same, edges)
+
+
+def test_there_is_no_time_of_a_box_that_does_not_yield(start, tmp_path):
+    with loaded(start("discs"), tmp_path) as session:
+        session.commands("fix drive all overdamped/affine drag 1.0\ntimestep 0.01\nrun 0")
+        assert [fix_vector(session, "drive", k) for k in (21, 22)] == [0, 0]
+
+
+@pytest.mark.parametrize("p", [1e-8, 1e-4, 1e-1])
+def test_pressures_of_all_sizes(p, tmp_path, measured):
+    """From a packing at twice the pressure.
+
+    On the way from far above jamming too many contacts open, and the packing closes again in about k_d d^2 / p, 1e8 at the
+    smallest pressure.
+    """
+    packing = js.make_packing(js.Spherocylinders(alpha=0), n=32, pressure=2 * p, progress=False)
+    with loaded(packing, tmp_path, sides="two") as session:
+        control = f"pressure iso {p} {p} tbox 20"
+        session.commands(f"{fix(control, 100, 'integrator rkc2 tolerance 1e-3')}\n{STRESSES}")
+        session.commands("run 100")
+        error = abs(global_vector(session, "stress")[2] / p - 1)
+    measured(error=error)
+    assert error < 1e-6
 
 
 @pytest.mark.parametrize(
@@ -266,7 +357,6 @@ def test_pressures_of_all_sizes(p, goal, start, tmp_path):
     [
         ("pressure iso -1e-3 1e-3 tbox 10", "the pressure -0.001, expected 0 or more: contacts push and never pull"),
         ("stress yy -1e-3 tbox 10", "the pressure -0.001, expected 0 or more"),
-        ("stress yy 1e-3", "a controlled stress without tbox, expected the time in which the box relaxes"),
         ("tbox 10", "tbox without a controlled stress"),
         ("stress yy 1e-3 tbox 0", "tbox 0, expected a positive time"),
         ("stress zz 1e-3 tbox 1", "stress zz, expected a component xx, yy or xy"),

@@ -41,7 +41,7 @@ _OF_CONTACTS = ("pressure", "u", "z", "z_single")
 _STATE = ("phi", *_OF_CONTACTS, "rattlers")
 _MOST_CUBATIC = 2000  # particles whose cubatic order takes less than a second
 _MADE = ("seed", "kappa", "u0", "protocol", "phi_start", "phi_end", "gdot",
-         "amplitude", "period", "cycles", "flow", "strain_step", "strain_end", "hold_pressure",
+         "amplitude", "period", "cycles", "flow", "strain_step", "strain_end", "hold_pressure", "box_time", "relaxation_time",
          "target_pressure", "target_phi", "box_yields", "tries", "outcome")  # fmt: skip
 
 

@@ -4,7 +4,7 @@
 
 The strain is a triangle wave, from 0 to the amplitude, to minus the amplitude, and back to 0, at the constant rate
 4 amplitude / period. Starts from a random packing compressed fast to --phi, or from the last frame of a file
-with particles (--start), or that of --frame. The last line of standard output is one JSON object with the state at the end, and of the first and
+with particles (--start), or that of --frame. With --pressure the height of the box yields to that normal pressure. The last line of standard output is one JSON object with the state at the end, and of the first and
 the last cycle the mean squared displacement of particles between its ends (displacement) and the dissipated energy
 over the volume (dissipated). per_cycle lists of each cycle the work of the stress, the energy lost, the storage and the
 loss modulus, how far particles are from where it began over the smallest inner radius (rms, largest), the number of

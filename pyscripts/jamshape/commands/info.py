@@ -51,6 +51,8 @@ _LINES = {
         "steps of {strain_step:g}",
         "to strain {strain_end:g}",
         "at pressure {hold_pressure:g}",
+        "where the box relaxes in {box_time:.3g}",
+        "and packings in about {relaxation_time:.3g}",
     ),
     "last cycle": (
         "number {last_cycle[number]}",

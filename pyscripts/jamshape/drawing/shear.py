@@ -47,6 +47,8 @@ class Cycles(NamedTuple):
     stress: FloatArray
     rows: int
     """Number of rows of a cycle."""
+    held: str = ""
+    """Pressure that is held instead of the volume, for the title."""
 
 
 def draw_cycles(axes: Axes, run: Cycles, system: System) -> None:
@@ -58,7 +60,7 @@ def draw_cycles(axes: Axes, run: Cycles, system: System) -> None:
         axes.plot(run.strain[part], run.stress[part], color=color, lw=1, label=f"cycle {cycle}")
     axes.set(xlabel=r"strain $\gamma$", ylabel=rf"shear stress  ${pressure_unit([system])}$")
     axes.locator_params(axis="x", nbins=5)  # small strains have long numbers
-    title = f"{systems_text([system])}, cyclic shear"
+    title = f"{systems_text([system])}, cyclic shear{run.held}"
     if len(run.strain) > run.rows:
         storage, loss = moduli_of(run.strain[part], run.stress[part])
         title += f"\ncycle {last}: $G'={storage:.3g}$, $G''={loss:.3g}$"
@@ -83,4 +85,5 @@ def draw_steps(axes: Axes, observables: Mapping[str, FloatArray], system: System
 
 def title_of(run: ShearOf) -> str:
     """Describe the system and the shear."""
-    return f"{ensemble_text(run.ensemble, ('n', 'phi', 'gdot'))}, {run.ensemble.flow} shear"
+    held = "hold_pressure" if run.ensemble.hold_pressure else "phi"
+    return f"{ensemble_text(run.ensemble, ('n', held, 'gdot'))}, {run.ensemble.flow} shear"

@@ -13,8 +13,8 @@ from jamshape.shapes.particles import parse_kind
 from jamshape.shapes.table import shape_named
 
 _NUMBERS = {"n": "N", "size_ratio": "R_b/R_s", "kappa": r"\kappa", "u0": "u_0",
-            "phi": r"\phi", "gdot": r"\dot\gamma"}  # fmt: skip
-_SMALL = frozenset({"u0", "kappa", "gdot"})
+            "phi": r"\phi", "gdot": r"\dot\gamma", "hold_pressure": "p_{yy}"}  # fmt: skip
+_SMALL = frozenset({"u0", "kappa", "gdot", "hold_pressure"})
 
 
 class Grouped(Protocol):

@@ -26,6 +26,8 @@ class Compression(Motion):
         Rate, dL/dt = -kappa L, [1/time]; negative to open the box.
     phi_end
         Final packing fraction.
+    p_end
+        Final pressure, [energy / length^D]: the run ends also at the first row that has it; None for none.
 
     Others as in `Motion`.
 
@@ -37,6 +39,7 @@ class Compression(Motion):
 
     kappa: float = 1e-4
     phi_end: float = 0.9
+    p_end: float | None = None
 
     name: ClassVar[str] = "compression"
 
@@ -45,6 +48,9 @@ class Compression(Motion):
             msg = f"kappa is {self.kappa}, expected a rate other than zero"
             raise ValueError(msg)
         require_positive(phi_end=self.phi_end)
+        if self.p_end is not None:
+            require_positive(p_end=self.p_end)
+            object.__setattr__(self, "p_end", float(self.p_end))
         super().__post_init__()
 
     @property
@@ -86,9 +92,14 @@ class Compression(Motion):
             raise ValueError(msg)
         return self.steps(phi, dimension)
 
+    def is_over(self, found: Mapping[str, float]) -> bool:
+        """Whether the final pressure is reached."""
+        return self.p_end is not None and found["pressure"] >= self.p_end
+
     def where(self, found: Mapping[str, float]) -> str:
         """Describe the position and the end."""
-        return f"phi {found['phi']:.4f} of {self.phi_end:g}"
+        until = "" if self.p_end is None else f" or to pressure {self.p_end:g}"
+        return f"phi {found['phi']:.4f} of {self.phi_end:g}{until}"
 
     def part(self, found: Mapping[str, float], phi_start: float) -> float:
         """Return the completed fraction of the strain."""

@@ -15,7 +15,7 @@ from jamshape.flow.lammps_driver import LammpsDriver, Sizes
 from jamshape.recording.driver import Plan, Row
 
 if TYPE_CHECKING:
-    from jamshape.packing import Packing
+    from jamshape.packing import Box, Packing
 
 
 def plan(
@@ -81,11 +81,27 @@ class CyclicDriver(LammpsDriver):
         return super()._row(sample)
 
     def _in_host(self, packing: Packing, strain: float = 0.0) -> FloatArray:
-        """(N, D) positions as at strain 0, if particles moved with the host, from the point at rest."""
+        """(N, D) positions as at strain 0, if particles moved with the host, from the point at rest.
+
+        Of a box that yields, they are those in the box of the start.
+        """
         box = packing.box
         found = packing.position + packing.image @ box.matrix.T - box.center
+        if self._cycle.hold_pressure is not None:
+            return np.asarray(found @ np.linalg.inv(self._deformation(box, strain)).T)
         if self._cycle.flow == "simple":
             found[:, 0] -= strain * found[:, 1]
         else:
             found[:, :2] *= np.exp([-strain, strain])
+        return found
+
+    def _deformation(self, box: Box, strain: float) -> FloatArray:
+        """(D, D) deformation of a box whose height yields, since the start, whatever its cell vectors."""
+        start = self._first.box
+        found = np.eye(box.dimension)
+        found[1, 1] = box.edges[1] / start.edges[1]
+        tilted = box.tilt[0] - start.tilt[0]
+        # The second cell vector may have become the sum of itself and several of the first.
+        others = np.rint((strain * box.edges[1] - tilted) / box.edges[0])
+        found[0, 1] = (tilted + others * box.edges[0]) / start.edges[1]
         return found

@@ -33,22 +33,18 @@ class CyclicShear(Shearing):
         Time of a cycle, [time].
     cycles
         Number of cycles.
-    flow
-        One of `jamshape.flow.shear.FLOWS`.
 
-    Others as in `Motion`.
+    Others as in `Shearing`.
 
     Raises
     ------
     ValueError
-        If a number is out of its range, the flow is unknown, a quarter of the period is no multiple of the time step,
-        the box would shear by more than 0.01 in a time step, or as `Motion`.
+        If a number is out of its range, a quarter of the period is no multiple of the time step, or as `Shearing`.
     """
 
     amplitude: float = 0.05
     period: float = 2000.0
     cycles: int = 20
-    flow: str = "simple"
 
     of_fix: ClassVar[Mapping[str, int]] = dict(Shearing.of_fix) | {
         "dissipation": 4, "torque_power": 19,

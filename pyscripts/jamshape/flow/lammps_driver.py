@@ -61,8 +61,7 @@ def plan(
     def restore(first: Packing, checkpoint: Checkpoint) -> LammpsDriver:
         return driver(first, settings, sizes, checkpoint or None)
 
-    own = {name: value for name, value in dataclasses.asdict(settings).items() if value is not None}
-    told = own | dict(made_from) | dataclasses.asdict(sizes)
+    told = dataclasses.asdict(settings) | dict(made_from) | dataclasses.asdict(sizes)
     told["dt"] = told.pop("dt")  # may follow from the others
     return Plan(settings.name, f"a {settings.name}", told, begin, restore, _ARGUMENTS)
 
@@ -98,6 +97,7 @@ class LammpsDriver:
         self._first, self.at_mark = first, False
         self._marked = checkpoint["evaluations"] if checkpoint else 0.0
         self._kept: Checkpoint | None = None  # of the present mark
+        self._is_over = False
         self._session = Session()
         try:
             self._run = FlowRun(self._session, settings, first, checkpoint)
@@ -113,8 +113,8 @@ class LammpsDriver:
 
     @property
     def done(self) -> bool:
-        """Whether the final strain or packing fraction is reached."""
-        return self._session.step >= self._run.last_step
+        """Whether the final strain, packing fraction or pressure is reached."""
+        return self._is_over or self._session.step >= self._run.last_step
 
     def first(self) -> Row:
         """Measure the state from which the run begins or goes on."""
@@ -136,6 +136,7 @@ class LammpsDriver:
 
     def _row(self, sample: motion.Row) -> Row:
         found, settings = sample.observables, self._run.settings
+        self._is_over = settings.is_over(found)
         text = f"{settings.where(found)}, pressure {found['pressure']:.2e}"
         told = Told(settings.name, text, settings.part(found, self._first.phi))
         error = found["local_error" if "local_error" in found else "step_error"]
@@ -152,9 +153,10 @@ class LammpsDriver:
         return self._kept
 
     def results(self) -> dict[str, Any]:
-        """Return what LAMMPS left out, and its version."""
+        """Return what LAMMPS left out, its version, and times of a box that yields."""
         session = self._session
-        return {"left_out": session.left_out(), "lammps_version": session.version}
+        own = {"left_out": session.left_out(), "lammps_version": session.version}
+        return own | self._run.times()
 
     def close(self) -> None:
         """End LAMMPS."""

@@ -31,6 +31,8 @@ _FLOW = {"strain": 1, "lambda_max": 2, "dt_max": 3, "evaluations": 5, "step_erro
 _SUBSTEPS = {"substeps": 8, "rejected": 9, "forced": 10, "substep": 11, "substep_shortest": 12,
              "local_error": 13, "stages": 14, "overlap_length": 15}  # fmt: skip
 
+_OF_BOX = (20, 21)  # its time, and the viscosity of the host
+
 INTEGRATORS = ("heun", "heun/adaptive", "rkc2")
 """Integrators of `fix overdamped/affine`; all but the first choose their own steps."""
 
@@ -112,6 +114,11 @@ class Motion(ABC):
         del found, second, dimension
         return {}
 
+    def times(self, box: float, viscosity: float) -> dict[str, float]:
+        """Return the times to report, from that in which the box relaxes and the viscosity of the host at the size of particles."""
+        del box, viscosity
+        return {}
+
     def gradient_at(self, step: int) -> str:
         """Velocity gradient of the steps that follow one."""
         del step
@@ -130,6 +137,11 @@ class Motion(ABC):
         ValueError
             If the end is already passed.
         """
+
+    def is_over(self, found: Mapping[str, float]) -> bool:
+        """Whether observed values end the run before its last step."""
+        del found
+        return False
 
     @abstractmethod
     def where(self, found: Mapping[str, float]) -> str:
@@ -277,6 +289,12 @@ class FlowRun(Generic[_Motion]):
             found |= {name: float(lmp.extract_fix("flow", 0, 1, k)) for name, k in flow.items()}
         found["evaluations"] += self._evaluations
         return found
+
+    def times(self) -> dict[str, float]:
+        """Return the times that the settings report."""
+        with one_at_a_time():
+            found = [float(self.session.lmp.extract_fix("flow", 0, 1, k)) for k in _OF_BOX]
+        return self.settings.times(*found)
 
     def packing(self) -> Packing:
         """Return the present state, sorted by ID."""

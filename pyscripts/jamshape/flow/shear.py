@@ -32,10 +32,31 @@ _BEARABLE = 0.5
 _STRAINS = {"simple": "shear_strain", "pure": "pure_strain"}
 
 
+@dataclass(frozen=True, kw_only=True)
 class Shearing(Motion):
-    """Settings of any shear in LAMMPS, as a base class."""
+    """Settings of any shear in LAMMPS, as a base class.
 
-    flow: str
+    Parameters
+    ----------
+    flow
+        One of `FLOWS`.
+    hold_pressure
+        Normal pressure p_yy that the height of the box holds, [energy / length^D]; None holds the volume.
+    t_box
+        Time in which the height relaxes, [time]; with a pressure. That of `fix overdamped/affine` if None.
+
+    Others as in `Motion`.
+
+    Raises
+    ------
+    ValueError
+        If the flow is unknown or drives a height that yields, a time comes without its pressure, the box would shear by more
+        than 0.01 in a time step, or as `Motion`.
+    """
+
+    flow: str = "simple"
+    hold_pressure: float | None = None
+    t_box: float | None = None
 
     of_packing: ClassVar[Mapping[str, int]] = dict(Motion.of_packing) | {
         "normal_difference": 14, "p_xy": 15, "sigma": 16, "mu": 17, "director": 21,
@@ -47,12 +68,25 @@ class Shearing(Motion):
 
     def __post_init__(self) -> None:
         require_one_of("flow", self.flow, FLOWS)
+        self._take_pressure()
         super().__post_init__()
         if self.gdot * self.dt > LARGEST_STRAIN * (1 + 1e-9):
             msg = (
                 f"gdot = {self.gdot:g} and dt = {self.dt:g} shear by {self.gdot * self.dt:g} in a step,"
                 f" expected at most {LARGEST_STRAIN:g}; use a smaller time step"
             )
+            raise ValueError(msg)
+
+    def _take_pressure(self) -> None:
+        for name in ("hold_pressure", "t_box"):
+            if (value := getattr(self, name)) is not None:
+                require_positive(**{name: value})
+                object.__setattr__(self, name, float(value))
+        if self.hold_pressure is None and self.t_box is not None:
+            msg = f"t_box {self.t_box} without a pressure, expected both or no time"
+            raise ValueError(msg)
+        if self.hold_pressure is not None and self.flow != "simple":
+            msg = f"flow {self.flow} drives the height of the box, which a pressure needs, expected flow simple or no pressure"
             raise ValueError(msg)
 
     @property
@@ -64,6 +98,29 @@ class Shearing(Motion):
     def gradient(self) -> str:
         """Velocity gradient in the syntax of `fix overdamped/affine`."""
         return f"{_WORDS[self.flow]} {self.gdot!r}"
+
+    @property
+    def control(self) -> str:
+        """Controlled stress in the syntax of `fix overdamped/affine`."""
+        if self.hold_pressure is None:
+            return ""
+        time = "" if self.t_box is None else f" tbox {self.t_box!r}"
+        return f" stress yy {self.hold_pressure!r}{time}"
+
+    def times(self, box: float, viscosity: float) -> dict[str, float]:
+        """Return the times of the box and of the packing, where a pressure is held."""
+        if self.hold_pressure is None:
+            return {}
+        return {"box_time": box, "relaxation_time": viscosity / self.hold_pressure}
+
+    def stresses(
+        self, found: Mapping[str, float], second: float, dimension: int
+    ) -> dict[str, float]:
+        """Return the normal pressure, where it is controlled."""
+        if self.hold_pressure is None:
+            return {}
+        away = second - found["normal_difference"]
+        return {"p_yy": found["pressure"] + away / dimension}
 
     def strained(self, found: Mapping[str, float]) -> float:
         """Return the strain among observables."""
@@ -99,63 +156,25 @@ class Shear(Shearing):
         Rate, [1/time]: dv_x/dy of simple shear, dv_x/dx = -dv_y/dy of pure shear.
     strain_end
         Final strain, the rate times the time since the start.
-    flow
-        One of `FLOWS`.
-    hold_pressure
-        Normal pressure p_yy that the height of the box holds, [energy / length^D]; None holds the volume.
-    t_box
-        Time in which the height relaxes, [time]; with a pressure.
 
-    Others as in `Motion`.
+    Others as in `Shearing`.
 
     Raises
     ------
     ValueError
-        If a number is not positive, the flow is unknown, pure shear goes beyond 3, the box would shear by more than 0.01
-        in a time step, or as `Motion`.
+        If a number is not positive, pure shear goes beyond 3, or as `Shearing`.
     """
 
     gdot: float = 1e-4
     strain_end: float = 5.0
-    flow: str = "simple"
-    hold_pressure: float | None = None
-    t_box: float | None = None
 
     name: ClassVar[str] = "shear"
 
     def __post_init__(self) -> None:
         require_positive(gdot=self.gdot, strain_end=self.strain_end)
-        if self.hold_pressure is not None and self.t_box is not None:
-            require_positive(hold_pressure=self.hold_pressure, t_box=self.t_box)
-            object.__setattr__(self, "hold_pressure", float(self.hold_pressure))
-            object.__setattr__(self, "t_box", float(self.t_box))
-            if self.flow != "simple":
-                msg = f"flow {self.flow} drives the height of the box, which a pressure needs, expected flow simple or no pressure"
-                raise ValueError(msg)
-        elif self.hold_pressure is not None or self.t_box is not None:
-            msg = f"pressure {self.hold_pressure} and t_box {self.t_box}, expected both or neither"
-            raise ValueError(msg)
         if self.flow == "pure":
             require_in("strain", self.strain_end, RANGES["pure_strain"])
         super().__post_init__()
-
-    @property
-    def control(self) -> str:
-        """Controlled stress in the syntax of `fix overdamped/affine`."""
-        return (
-            ""
-            if self.hold_pressure is None
-            else f" stress yy {self.hold_pressure!r} tbox {self.t_box!r}"
-        )
-
-    def stresses(
-        self, found: Mapping[str, float], second: float, dimension: int
-    ) -> dict[str, float]:
-        """Return the normal pressure, where it is controlled."""
-        if self.hold_pressure is None:
-            return {}
-        away = second - found["normal_difference"]
-        return {"p_yy": found["pressure"] + away / dimension}
 
     def in_steps(self, rows: int) -> Shear:
         """Return the same with a time step equal to the interval of rows, or a divisor of it."""

@@ -61,6 +61,7 @@ def compress(
     dimension: int = 2,
     phi: tuple[float, float] = PHI,
     kappa: float = 1e-5,
+    p_end: float = math.inf,
     seed: int = 1,
     sides: int = 2,
     integrator: str | None = None,
@@ -87,6 +88,8 @@ def compress(
         Packing fraction of the random start, and final packing fraction.
     kappa : float, [1/time]
         Compression rate: the box shrinks with dL/dt = -kappa L.
+    p_end : float, [energy / length^D]
+        Final pressure: stop also at the first of the `rows` at which it is reached.
     seed : int
         Random seed of the start.
     sides : int
@@ -126,6 +129,11 @@ def compress(
     TimeLimitError
         If `seconds` are over before the end.
 
+    Warns
+    -----
+    NotReachedWarning
+        If `p_end` is given and not reached.
+
     Examples
     --------
     >>> import jamshape as js
@@ -137,10 +145,11 @@ def compress(
     require_rising(*phi)
     require_stated(n=n, seed=seed, kappa=kappa, rows=rows, frames=frames)
     require_one_of("dimension", dimension, (2, 3))
-    require_given(dt=dt, integration_tolerance=integration_tolerance)
+    aim = None if p_end == math.inf else p_end
+    require_given(p_end=aim, dt=dt, integration_tolerance=integration_tolerance)
     integrator = integrator or ("rkc2" if dt is None and sides == 2 else "heun")
     settings = Compression(
-        kappa=kappa, phi_end=phi[1], dt=_DT if dt is None else dt,
+        kappa=kappa, phi_end=phi[1], p_end=aim, dt=_DT if dt is None else dt,
         sides=sides, integrator=integrator,
         tolerance=_ERROR if integration_tolerance is None else integration_tolerance,
     )  # fmt: skip

@@ -155,7 +155,9 @@ def _shear(run: ShearFile, axes: Axes, color: str) -> None:
 
 def _cyclic(run: CyclicShearFile, axes: Axes, color: str) -> None:
     del color
-    cycles = Cycles(run.strain, run.stress, int(run.about["rows"]))
+    is_held = "hold_pressure" in run.about
+    held = f" at {attribute_text('hold_pressure', run.about)}" if is_held else ""
+    cycles = Cycles(run.strain, run.stress, int(run.about["rows"]), held)
     draw_cycles(axes, cycles, system_of(run.about, *read_style(run.file)))
 
 

@@ -48,7 +48,7 @@ from jamshape.measures.contact_changes import (
     contact_changes,
     numbers_of_changes,
 )
-from jamshape.measures.cycles import Cycle, Ends, Rows, cycles_of
+from jamshape.measures.cycles import Cycle, Ends, Rows, Yielding, cycles_of
 from jamshape.measures.events import Event, stress_drops
 from jamshape.measures.jamming import Jamming, Tried, minimised_frames
 from jamshape.measures.onset import OnsetFit, fit_onset
@@ -318,7 +318,7 @@ class ShearFile(Recorded):
         return steady_state(self.observables, self.strain, after)
 
     def __repr__(self) -> str:
-        start = f"gdot = {self.gdot:g}, phi = {self.phi[0]:.5g}"
+        start = f"gdot = {self.gdot:g}, {_held(self)}"
         end = f"strain = {self.strain[-1]:.5g}, pressure = {self.pressure[-1]:.3g}"
         return f"<Shear of {self._who()} at {start}: {len(self)} frames to {end}{self._where()}>"
 
@@ -365,12 +365,19 @@ class CyclicShearFile(Recorded):
 
     @property
     def dissipated(self) -> FloatArray:
-        """(C,) energy that the drag dissipates in each cycle over the volume, by the trapezoidal rule, [energy / length^D]."""
+        """(C,) energy that the drag dissipates in each cycle over the volume at its start, by the trapezoidal rule, [energy / length^D]."""
         rows, period = int(self.about["rows"]), float(self.about["period"])
-        power = self["dissipation"]
+        yielding = self._yielding
+        volume = np.ones(len(self.phi)) if yielding is None else yielding.volume
+        power = self["dissipation"] * volume
         means = (power[1:] + power[:-1]) / 2
         whole = means[: len(means) // rows * rows].reshape(-1, rows)
-        return np.asarray(whole.mean(axis=1) * period)
+        return np.asarray(whole.mean(axis=1) * period / volume[:-1:rows][: len(whole)])
+
+    @property
+    def _yielding(self) -> Yielding | None:
+        """Normal pressures and volumes, where the height of the box yields."""
+        return Yielding(self["p_yy"], 1 / self.phi) if "hold_pressure" in self.about else None
 
     @checked
     def cycles(self, tolerance: float = RETURNED, *, first: int = 1) -> list[Cycle]:
@@ -395,14 +402,14 @@ class CyclicShearFile(Recorded):
         require_positive(tolerance=tolerance)
         frames, period = recorded_frames(self.file), float(self.about["period"])
         kept = {round(time / period): k for k, time in enumerate(frames.times.tolist())}
-        rows = Rows(self.strain, self.stress, self.dissipated, int(self.about["rows"]))
+        rows = Rows(
+            self.strain, self.stress, self.dissipated, int(self.about["rows"]), self._yielding
+        )
         return cycles_of(rows, Ends(kept, frames, rattlers=True), tolerance, first)
 
     def __repr__(self) -> str:
         cycles = len(self.displacement)
-        start = (
-            f"phi = {self.phi[0]:.5g}: {cycles} cycles to strains of +-{self.about['amplitude']:g}"
-        )
+        start = f"{_held(self)}: {cycles} cycles to strains of +-{self.about['amplitude']:g}"
         end = f", displacement = {self.displacement[-1]:.3g}" if cycles else ""
         return f"<Cyclic shear of {self._who()} at {start}{end}{self._where()}>"
 
@@ -475,8 +482,12 @@ class QuasistaticShearFile(Recorded):
             if step > 0 and (step - 1) % per_cycle == 0
         }
         done = (len(self.strain) - 1) // per_cycle
-        lost = self["lost"][1 : done * per_cycle + 1].reshape(done, per_cycle).sum(axis=1)
-        rows = Rows(self.strain, self.stress, lost, per_cycle)
+        p = self._how.hold_pressure
+        yielding = Yielding(np.full(len(self.phi), p), 1 / self.phi) if p else None
+        volume = yielding.volume if yielding else np.ones(len(self.phi))
+        lost = (self["lost"] * volume)[1 : done * per_cycle + 1].reshape(done, per_cycle)
+        lost = lost.sum(axis=1) / volume[:-1:per_cycle][:done]
+        rows = Rows(self.strain, self.stress, lost, per_cycle, yielding)
         return cycles_of(rows, Ends(kept, frames, rattlers=False), tolerance, first)
 
     @property
@@ -700,6 +711,12 @@ class LadderFile(Recorded):
 
 _OBSERVABLE_OF = {"u0": "u", "pressure": "pressure"}
 """Observable of a control parameter."""
+
+
+def _held(run: ShearFile | CyclicShearFile) -> str:
+    """Describe what a shear holds, its packing fraction or the normal pressure."""
+    pressure = run.about.get("hold_pressure")
+    return f"phi = {run.phi[0]:.5g}" if pressure is None else f"p_yy = {pressure:g}"
 
 
 def _brought_along(kind: type[Recorded], name: str, content: bytes) -> Recorded:

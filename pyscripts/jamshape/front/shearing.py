@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from jamshape.arguments import checked
 from jamshape.checks import (
@@ -87,7 +88,8 @@ def shear(
     pressure : float, [energy / length^D]
         Normal pressure p_yy to hold in simple shear, to which the height of the box yields; 0 holds the volume.
     t_box : float, [time], optional
-        Time in which the height of the box relaxes, with a pressure; 0.01 / gdot by default, a strain of 0.01, but at least 1.
+        Time in which the height of the box relaxes, with a pressure. By default the height follows as fast as a packing at
+        this pressure relaxes, in about k_d d^2 / p.
     seed : int, optional
         Random seed of the start; 1 by default.
     start : Packing or path, optional
@@ -145,7 +147,7 @@ def shear(
     at = place(file, "shear.h5")
     whole = dt is None and sides == 2
     integrator = integrator or _usual(gdot, of.dimension, whole=whole, yields=pressure > 0)
-    held = _held(pressure, t_box, gdot, flow, integrator)
+    held = _held(pressure, t_box, flow, integrator)
     if integrator in METHODS:
         require_no_effect("integrator", integrator, dt=dt, frames=frames)
         longest = min(SlowShear.largest_strain, strain / rows)
@@ -178,6 +180,8 @@ def cyclic_shear(
     period: float = 2000.0,
     cycles: int = 20,
     flow: str = "simple",
+    pressure: float = 0.0,
+    t_box: float | None = None,
     seed: int | None = None,
     start: Held | None = None,
     sides: int = 2,
@@ -191,7 +195,7 @@ def cyclic_shear(
     seconds: float | None = None,
     progress: bool = True,
 ) -> CyclicShearFile:
-    """Shear particles to and fro between two strains, at a constant packing fraction, in LAMMPS.
+    """Shear particles to and fro between two strains, at a constant packing fraction or normal pressure, in LAMMPS.
 
     The strain is a triangle wave: from 0 to the amplitude, to minus the amplitude, and back to 0, at the constant rate 4
     amplitude / period.
@@ -213,6 +217,10 @@ def cyclic_shear(
     cycles : int
         Number of cycles.
     flow : {"simple", "pure"}
+    pressure : float, [energy / length^D]
+        Normal pressure p_yy to hold in simple shear, to which the height of the box yields; 0 holds the volume.
+    t_box : float, [time], optional
+        Time in which the height of the box relaxes, with a pressure, as in `shear`.
     seed : int, optional
         Random seed of the start; 1 by default.
     start : Packing or path, optional
@@ -259,12 +267,15 @@ def cyclic_shear(
     >>> bool(run.displacement[-1] < run.displacement[0])
     True
     """
-    require_stated(amplitude=amplitude, period=period, cycles=cycles, rows=rows)
-    require_given(dt=dt, integration_tolerance=integration_tolerance, frames=frames)
+    require_stated(
+        amplitude=amplitude, period=period, cycles=cycles, rows=rows, hold_pressure=pressure
+    )
+    require_given(t_box=t_box, dt=dt, integration_tolerance=integration_tolerance, frames=frames)
     _require_cycle(amplitude, period, rows)
     of = Start.of(particles, Asked(n, phi, seed, dimension), start, usual_phi=0.8, sides=sides, phi_name=_PHI_NAME)  # fmt: skip
     at = place(file, "cycles.h5")
     integrator = integrator or ("heun" if dt is not None or sides == 1 else "rkc2")
+    held = _held(pressure, t_box, flow, integrator)
     longest = longest_step(amplitude, period)
     if integrator == "heun":
         require_no_effect("integrator", integrator, integration_tolerance=integration_tolerance)
@@ -274,7 +285,7 @@ def cyclic_shear(
     settings = CyclicShear(
         amplitude=amplitude, period=period, cycles=cycles, flow=flow,
         dt=dividing(period, rows, longest), sides=sides, k_e=of.k_e, integrator=integrator,
-        tolerance=integration_tolerance or _ERROR,
+        tolerance=integration_tolerance or _ERROR, **held,
     )  # fmt: skip
     sizes = Sizes(rows, cycles if frames is None else frames)
     made_from = of.made_from | {"dimension": of.dimension}
@@ -423,9 +434,7 @@ def _usual(gdot: float, dimension: int, *, whole: bool, yields: bool) -> str:
     return "tr-bdf2" if gdot <= _SLOW[dimension] and not yields else "rkc2"
 
 
-def _held(
-    pressure: float, t_box: float | None, gdot: float, flow: str, integrator: str
-) -> dict[str, float]:
+def _held(pressure: float, t_box: float | None, flow: str, integrator: str) -> dict[str, Any]:
     """Return the settings of a pressure to hold, none without one, and refuse what does not go with it."""
     if not pressure:
         require_no_effect("pressure", pressure, t_box=t_box)
@@ -436,7 +445,7 @@ def _held(
     if flow != "simple":
         said = "{flow} shear drives the height of the box, expected simple shear with a pressure"
         raise ArgumentError(said, {"flow": flow})
-    return {"hold_pressure": pressure, "t_box": max(1.0, 0.01 / gdot) if t_box is None else t_box}
+    return {"hold_pressure": pressure, "t_box": t_box}
 
 
 def _require_cycle(amplitude: float, period: float, rows: int) -> None:

@@ -38,7 +38,8 @@ class Cycle(NamedTuple):
     number: int
     """From 1."""
     work: float
-    """Integral of the stress over the strain, by the trapezoidal rule over the rows, [energy / length^D]."""
+    """Work of the shear stress, and of the normal pressure where the volume changes, on the box over the volume at the
+    start of the cycle, by the trapezoidal rule over the rows, [energy / length^D]."""
     lost: float
     """Energy dissipated over the volume, by drag at a rate or by minimisations, [energy / length^D]."""
     storage: float
@@ -55,6 +56,15 @@ class Cycle(NamedTuple):
     """Whether `largest` is at most the tolerance; None if a state was not kept."""
 
 
+class Yielding(NamedTuple):
+    """Rows of a box that yields to a normal pressure."""
+
+    pressure: FloatArray
+    """(T,) normal pressures on the edges that move, [energy / length^D]."""
+    volume: FloatArray
+    """(T,) volumes, in any unit."""
+
+
 class Rows(NamedTuple):
     """Rows of cycles."""
 
@@ -66,11 +76,24 @@ class Rows(NamedTuple):
     """(C,) dissipated energy over the volume of each cycle."""
     per_cycle: int
     """Number of rows of a cycle, without its first."""
+    yielding: Yielding | None = None
+    """None where the volume is held."""
 
     def of(self, number: int) -> tuple[FloatArray, FloatArray]:
         """Return strain and stress of a cycle, counted from 1, with both its ends."""
-        part = slice((number - 1) * self.per_cycle, number * self.per_cycle + 1)
+        part = self._part(number)
         return self.strain[part], self.stress[part]
+
+    def work(self, number: int) -> float:
+        """Return the work of a cycle over the volume at its start, [energy / length^D]: integral of V stress d(strain) - p dV."""
+        strain, stress = self.of(number)
+        if self.yielding is None:
+            return work_of(strain, stress)
+        pressure, volume = (each[self._part(number)] for each in self.yielding)
+        return (work_of(strain, stress * volume) - work_of(volume, pressure)) / float(volume[0])
+
+    def _part(self, number: int) -> slice:
+        return slice((number - 1) * self.per_cycle, number * self.per_cycle + 1)
 
 
 def work_of(strain: FloatArray, stress: FloatArray) -> float:
@@ -173,6 +196,6 @@ def cycles_of(rows: Rows, ends: Ends, tolerance: float, first: int = 1) -> list[
         far = ends.distance(number)
         rms, largest, changed = far or (math.nan, math.nan, None)
         returns = None if far is None else far.largest <= tolerance
-        energies = work_of(strain, stress), float(rows.lost[number - 1])
+        energies = rows.work(number), float(rows.lost[number - 1])
         found.append(Cycle(number, *energies, *moduli_of(strain, stress), rms, largest, changed, returns))  # fmt: skip
     return found

@@ -23,6 +23,8 @@ class Sheared(NamedTuple):
     phi: float
     gdot: float
     flow: str
+    hold_pressure: float
+    """0 if the volume is held; if not, `phi` is that of the start."""
 
     def report(self) -> dict[str, Any]:
         """Return a description for JSON."""
@@ -64,7 +66,7 @@ def read_shear(path: Path, after: float | None = None) -> ShearOf:
     phi, flow = round(float(found["phi"][0]), 9), str(known["flow"])
     ensemble = Sheared(
         file.system(), int(known["n"]), float(known.get("size_ratio", 1.0)), phi,
-        float(known["gdot"]), flow,
+        float(known["gdot"]), flow, float(known.get("hold_pressure", 0.0)),
     )  # fmt: skip
     strain = strain_of(found, flow)
     run = ShearOf(path, ensemble, int(known.get("seed", 0)), strain, found, None)

@@ -121,7 +121,8 @@ def block_average(values: FloatArray) -> Blocks:
     while len(blocks) >= _FEWEST:
         error = _error(blocks)
         largest = max(largest, error)
-        if length**3 > 2 * n * (error / first) ** 4:
+        # Blocks may be equal that leave out the first values.
+        if error > 0 and length**3 > 2 * n * (error / first) ** 4:
             return Blocks(mean, error, (error / first) ** 2)
         even = len(blocks) // 2 * 2
         blocks = blocks[len(blocks) - even :].reshape(-1, 2).mean(axis=1)

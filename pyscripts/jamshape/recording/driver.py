@@ -89,7 +89,8 @@ class Plan:
     what
         Name in messages, with its article, such as ``a compression``.
     settings
-        Attributes that identify it: a file with others is refused. Those that follow from others are the last.
+        Attributes that identify it: a file with others is refused, and one that has what is None here. Those that follow
+        from others are the last.
     begin
         Makes the driver at its start.
     restore

@@ -159,7 +159,8 @@ def _opened(path: Path, plan: Plan, how: How) -> _Run | None:
 def _begun(path: Path, plan: Plan) -> _Run:
     """Begin a run; its file keeps the start, and shows at once whether it can be written."""
     driver = plan.begin()
-    content = Content(path, [driver.frame()], {KIND: plan.kind, **plan.settings})
+    settings = {name: value for name, value in plan.settings.items() if value is not None}
+    content = Content(path, [driver.frame()], {KIND: plan.kind, **settings})
     run = _Run(content, driver, plan.finish)
     run.add(driver.first()._replace(error=None, has_frame=False))
     if plan.finish is None:
@@ -226,4 +227,6 @@ class _Shown:
 
 
 def _is_same(stored: Any, value: Any) -> bool:
-    return stored is not None and np.array_equal(stored, value)
+    if stored is None or value is None:
+        return stored is value
+    return np.array_equal(stored, value)

@@ -17,6 +17,24 @@ def start():
     return random_packing(8, 0.5, 1, DISCS)
 
 
+@pytest.mark.lammps
+def test_a_compression_in_lammps_ends_at_a_pressure_or_says_that_it_did_not(tmp_path):
+    how = {"n": 16, "phi": (0.5, 1.0), "kappa": 1e-3, "rows": 100, "progress": False}
+    rods = js.Spherocylinders(alpha=1)
+    whole = js.compress(rods, file=tmp_path / "whole.h5", **how)
+    run = js.compress(rods, p_end=1e-2, file=tmp_path / "run.h5", **how)
+    end = int(np.argmax(whole.pressure >= 1e-2))
+    assert 0 < end < 100
+    np.testing.assert_array_equal(run.pressure, whole.pressure[: end + 1])
+    assert run.packing().phi == pytest.approx(run.phi[-1], rel=1e-12)
+    assert js.resume(run.file, progress=False).about["finished"]
+    assert "p_end" not in whole.about
+    with pytest.raises(ValueError, match=r"a compression with p_end=0\.01, expected"):
+        js.compress(rods, file=run.file, **how)
+    with pytest.warns(js.NotReachedWarning, match=r"expected p_end=0.5; take a larger phi_end"):
+        js.compress(rods, p_end=0.5, file=tmp_path / "not.h5", **how)
+
+
 def test_a_pressure_that_is_not_reached_is_said(start, tmp_path):
     how = {"phi": (None, 0.52), "kappa": 1e-3, "file": tmp_path / "slow.h5", "progress": False}
     with pytest.warns(js.NotReachedWarning, match=r"expected p_end=0.5; take a larger phi_end"):

@@ -34,6 +34,15 @@ def test_what_does_not_change_has_no_error():
     assert block_average(np.full(100, 3.0)) == (3.0, 0.0, 1.0)
 
 
+def test_a_series_whose_first_values_alone_differ_has_an_error():
+    """Blocks of an odd number leave out the first ones, and are all equal from then on."""
+    values = np.zeros(750)
+    values[3:11] = 3.4
+    found = block_average(values)
+    assert found.error > np.std(values) / np.sqrt(750)
+    assert found.inefficiency > 1
+
+
 def test_few_values_have_an_error_that_nobody_knows():
     found = block_average(np.arange(5.0))
     assert found.mean == 2
