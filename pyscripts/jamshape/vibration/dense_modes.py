@@ -39,6 +39,9 @@ _STIFFER = 3.0
 
 _SWEEPS = 30
 
+# Limits, relative to the largest, of the eigenvalue at which a spectrum without bands is divided.
+_LOWEST, _LOW = 1e-6, 1e-3
+
 
 class Found(NamedTuple):
     """Result of a method, in no particular order."""
@@ -70,10 +73,13 @@ def two_levels(matrix: DynamicalMatrix, *, refine: bool) -> Found:
     """Find all modes; `refine` the low ones in long double (see `modes.spectrum`)."""
     split = _split(matrix)
     products = Products(matrix)
-    vectors = split.high_vectors()
+    if len(split.D):
+        soft, vectors = split.low_vectors(), split.high_vectors()
+    else:
+        soft, vectors = _without_bands(products, split)
     high = products.quotients(vectors)
     high_values = high.value.astype(np.float64)
-    low = _low_modes(products, np.column_stack([matrix.translations, split.low_vectors()]), refine)
+    low = _low_modes(products, np.column_stack([matrix.translations, soft]), refine)
     # The rest of the space, which is stiffer, lowers low modes by at most leak.leak.
     leak = low.outside / np.sqrt(0.5 * high_values.min(initial=np.inf))
     pull = low.coupling + np.outer(leak, leak)
@@ -114,8 +120,6 @@ class _Split:
         With y = -(D - lambda)^-1 B^T x, the modes (y, x) solve
         (E - B D^-1 B^T) x = lambda (1 + B D^-2 B^T) x + O(lambda^2).
         """
-        if not len(self.D):
-            return np.asarray(self.Z @ scipy.linalg.eigh(self.E)[1])
         P = self._solved(self.B.T)
         values, x = scipy.linalg.eigh(self.E - self.B @ P, np.eye(len(self.E)) + P.T @ P)
         first = -(P @ x)
@@ -133,14 +137,31 @@ class _Split:
     def high_vectors(self) -> FloatArray:
         """(n, r) modes above."""
         r, n = len(self.D), len(self.D) + len(self.E)
-        if r == 0:
-            return np.empty((self.R.shape[0], 0))
         whole = np.block([[self.D, self.B.T], [self.B, self.E]])
         vectors = scipy.linalg.eigh(whole, subset_by_index=[n - r, n - 1], overwrite_a=True)[1]
         return np.asarray(self.R @ vectors[:r] + self.Z @ vectors[r:])
 
     def _solved(self, right: FloatArray) -> FloatArray:
         return np.asarray(scipy.linalg.cho_solve(self.factors, right))
+
+
+def _without_bands(products: Products, split: _Split) -> tuple[FloatArray, FloatArray]:
+    """(n, z) low and (n, r) higher modes of a continuous spectrum, which prestress and stiffness share.
+
+    Modes of M in doubles couple by some roundings of its largest eigenvalue. That suffices above the widest gap of some
+    decades of the spectrum; those below are turned among themselves in long double.
+    """
+    values, turn = scipy.linalg.eigh(split.E)
+    vectors = split.Z @ turn
+    largest = float(np.abs(values).max(initial=0.0))
+    low, high = np.searchsorted(values, [_LOWEST * largest, _LOW * largest])
+    edges = np.maximum(values[max(low - 1, 0) : high + 1], _LOWEST * largest)
+    n_low = max(low - 1, 0) + 1 + int(np.argmax(edges[1:] / edges[:-1])) if len(edges) > 1 else low
+    soft = vectors[:, :n_low]
+    A, N = _within(soft, products.images(soft))
+    among = scipy.linalg.eigh(A.astype(np.float64), N.astype(np.float64))[1]
+    soft = soft @ among
+    return soft / np.linalg.norm(soft, axis=0), vectors[:, n_low:]
 
 
 def _split(matrix: DynamicalMatrix) -> _Split:
