@@ -301,7 +301,7 @@ template <int D, class S> class SpherocylinderContact {
     Found contact = without(ContactStatus::TOUCHING);
     contact.kind = ContactKind::SIDE_TO_SIDE;
     add_bond(contact, closest, of.distance, of.near);
-    add_bond(contact, far_end, of.far_distance, of.far);
+    if (value_of(of.far.share) > LEAST_SHARE) add_bond(contact, far_end, of.far_distance, of.far);
     add_sharing(contact, of);
     for (Bond<D, S> &bond : contact.bond) bond.force += 0.5 * of.push;
     return contact;

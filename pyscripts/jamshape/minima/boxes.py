@@ -10,7 +10,7 @@ holds for the strains that keep it. Independent of shape and dimension.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,7 +30,7 @@ from jamshape.packing.box import COMPONENTS
 FIXED, ISOTROPIC, FREE, SHEAR = "fixed", "isotropic", "free", "xy"
 
 _MOST_STEPS = 400  # of the box
-_ROUGH = 1e-6  # residual of minima on the way
+_ROUGH, _FINER = 1e-6, 0.5  # residual of minima on the way, and its change where that is too much
 _TIGHT, _FLOORS = (
     1e-12,
     10.0,
@@ -236,6 +236,8 @@ class Settling:
         Of the box since the start.
     tolerance
         Residual of the particles that suffices; grows where only sliding is left.
+    rough
+        Residual of minima on the way; falls where forces that are left make predictions wrong.
     done
         Whether the goal is reached, or as near as can be.
     """
@@ -250,6 +252,7 @@ class Settling:
     n_steps: int = 0
     stress_error: float = math.inf
     tolerance: float = 0.0
+    rough: float = _ROUGH
     done: bool = False
     deformation: FloatArray | None = None
     history: History = field(default_factory=History)
@@ -357,6 +360,8 @@ def _judge(landscape: Landscape, at: Settling, goal: Yielding) -> None:
     left = present.residual.largest
     if present.outcome is Outcome.STALLED and left < _SLIDING:
         at.tolerance = max(at.tolerance, 1.5 * left)
+        if left <= goal.tolerance:  # short of a tighter one only
+            at.present = present = replace(present, outcome=Outcome.CONVERGED)
     is_balanced = left <= at.tolerance or present.outcome is Outcome.KINK
     at.done = is_balanced and at.stress_error <= goal.accuracy and _has_energy(present, goal)
 
@@ -477,6 +482,7 @@ def _step(landscape: Landscape, at: Settling, goal: Yielding) -> None:
         at.level = first_level(landscape) if _changes_shape(goal, found.state) else 0.0
     elif not _is_better(landscape, (at, trial, found), goal):
         if present.residual.largest > at.tolerance:  # forces that are left make predictions wrong
+            at.rough = max(_FINER * at.rough, goal.tolerance)
             stop = Stop(at.tolerance)
             at.present = minimise(landscape, present.state, "near", stop, at.history)
         else:
@@ -505,7 +511,7 @@ def _trial(landscape: Landscape, at: Settling, goal: Yielding) -> _Trial:
     matrix = _matrix(posed.strains, e, every[0], keeps_volume=goal.keeps_volume)
     moved = landscape.displaced(state, x).deformed(matrix).with_least_tilt()
     is_near = length < 0.999 * largest and at.stress_error < _NEAR
-    tolerance = max(goal.tolerance, _ROUGH)
+    tolerance = max(goal.tolerance, at.rough)
     if is_near:
         floor = _FLOORS * rounding_floor(present.evaluation, landscape)
         is_sliding = at.tolerance > goal.tolerance
@@ -569,17 +575,16 @@ def _posed(
 def _within(posed: _Posed, largest: float) -> FloatArray:
     """Minimise the quadratic model of the enthalpy within a ball."""
     values, axes = np.linalg.eigh(0.5 * (posed.curvature + posed.curvature.T))
-    along = axes.T @ posed.slope
-    low, high = max(0.0, -float(values[0])), 0.0
-
-    def at(shift: float) -> FloatArray:
-        return np.asarray(-along / np.maximum(values + shift, 1e-300))
-
     if values[0] > 0:
         whole = -np.linalg.solve(posed.curvature, posed.slope)
         if np.linalg.norm(whole) <= largest:
             return np.asarray(whole)
-    high = low + float(np.linalg.norm(along)) / largest
+    along, gaps = axes.T @ posed.slope, values - min(0.0, float(values[0]))
+
+    def at(shift: float) -> FloatArray:
+        return np.asarray(-along / np.maximum(gaps + shift, 1e-300))
+
+    low, high = 0.0, float(np.linalg.norm(along)) / largest
     for _ in range(200):
         middle = 0.5 * (low + high)
         if np.linalg.norm(at(middle)) > largest:

@@ -1,8 +1,8 @@
-"""All modes of a dynamical matrix in two blocks: modes held by stiffness, and the rest.
+"""All modes of a dynamical matrix in two blocks: low modes, and the rest.
 
-The singular vectors of C give the null space of H = C^T C without forming H. There the prestress
-acts alone, to second order (a Schur complement with small terms only), and each eigenvalue is the
-quotient |C v|^2 - v.S v of its mode, in long double.
+Eigenvectors in doubles mix by some roundings of the largest eigenvalue over their distance, and their eigenvalues by the square of
+that, apart from those of low modes among themselves: these are turned in long double. Each eigenvalue is the quotient |C v|^2 - v.S v
+of its mode, in long double.
 """
 
 from __future__ import annotations
@@ -33,11 +33,10 @@ from jamshape.vibration.quotients import (
 RANK_TOLERANCE = 1e-6
 _RESIDUALS = 10.0  # likewise, relative to the largest times the residual
 
-# Modes of H are stiff if they are this factor stiffer than all effects of the prestress on the rest:
-# nearly round rods leave a factor of six. Each sweep gains as much.
-_STIFFER = 3.0
-
 _SWEEPS = 30
+
+# Limits, relative to the largest, of the eigenvalue at which the spectrum is divided.
+_LOWEST, _LOW = 1e-6, 1e-3
 
 
 class Found(NamedTuple):
@@ -68,12 +67,12 @@ def rank_tolerance(residual: float) -> float:
 
 def two_levels(matrix: DynamicalMatrix, *, refine: bool) -> Found:
     """Find all modes; `refine` the low ones in long double (see `modes.spectrum`)."""
-    split = _split(matrix)
     products = Products(matrix)
-    vectors = split.high_vectors()
+    soft, vectors = _divided(matrix)
     high = products.quotients(vectors)
     high_values = high.value.astype(np.float64)
-    low = _low_modes(products, np.column_stack([matrix.translations, split.low_vectors()]), refine)
+    soft = _turned(products, soft)
+    low = _low_modes(products, np.column_stack([matrix.translations, soft]), refine)
     # The rest of the space, which is stiffer, lowers low modes by at most leak.leak.
     leak = low.outside / np.sqrt(0.5 * high_values.min(initial=np.inf))
     pull = low.coupling + np.outer(leak, leak)
@@ -88,91 +87,32 @@ def two_levels(matrix: DynamicalMatrix, *, refine: bool) -> Found:
         solver_error=np.concatenate([low_error, high_error]),
         entry_error=np.concatenate([low.quotients.entries, high.entries]),
         overlap_error=np.concatenate([low.quotients.overlaps, high.overlaps]),
-        singular_values=split.singular_values,
+        singular_values=_singular_values(matrix),
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Split:
-    """Stiff modes R of H and the rest Z, without translations; M in the basis of both.
-
-    In the order (R, Z), M is [[D, B^T], [B, E]], with D about the squares of singular values and
-    B, E of the size of the prestress.
-    """
-
-    R: FloatArray
-    Z: FloatArray
-    D: FloatArray
-    B: FloatArray
-    E: FloatArray
-    factors: Any
-    singular_values: FloatArray
-
-    def low_vectors(self) -> FloatArray:
-        """(n, z) modes below D, to second order in the prestress.
-
-        With y = -(D - lambda)^-1 B^T x, the modes (y, x) solve
-        (E - B D^-1 B^T) x = lambda (1 + B D^-2 B^T) x + O(lambda^2).
-        """
-        if not len(self.D):
-            return np.asarray(self.Z @ scipy.linalg.eigh(self.E)[1])
-        P = self._solved(self.B.T)
-        values, x = scipy.linalg.eigh(self.E - self.B @ P, np.eye(len(self.E)) + P.T @ P)
-        first = -(P @ x)
-        y, scale = first, np.abs(first).max(initial=1e-300)
-        for _ in range(_SWEEPS):
-            last, y = y, first + self._solved(y) * values
-            if np.abs(y - last).max(initial=0.0) < EPS * scale:
-                break
-        mixed = y.T @ (self.B.T @ x)
-        squared = y.T @ (self.D @ y) + mixed + mixed.T + x.T @ (self.E @ x)
-        turn = scipy.linalg.eigh(squared, y.T @ y + x.T @ x)[1]
-        vectors = self.Z @ (x @ turn) + self.R @ (y @ turn)
-        return np.asarray(vectors / np.linalg.norm(vectors, axis=0))
-
-    def high_vectors(self) -> FloatArray:
-        """(n, r) modes above."""
-        r, n = len(self.D), len(self.D) + len(self.E)
-        if r == 0:
-            return np.empty((self.R.shape[0], 0))
-        whole = np.block([[self.D, self.B.T], [self.B, self.E]])
-        vectors = scipy.linalg.eigh(whole, subset_by_index=[n - r, n - 1], overwrite_a=True)[1]
-        return np.asarray(self.R @ vectors[:r] + self.Z @ vectors[r:])
-
-    def _solved(self, right: FloatArray) -> FloatArray:
-        return np.asarray(scipy.linalg.cho_solve(self.factors, right))
+def _divided(matrix: DynamicalMatrix) -> tuple[FloatArray, FloatArray]:
+    """(n, z) low and (n, r) high modes in doubles, without translations, divided at a wide gap of the spectrum."""
+    M, T = matrix.matrix.toarray(), matrix.translations
+    # Translations become the stiffest modes, to be left out.
+    M += 2 * float(np.abs(M).sum(axis=0).max(initial=1e-300)) * (T @ T.T)
+    values, vectors = scipy.linalg.eigh(M, overwrite_a=True, check_finite=False, driver="evr")
+    n = len(values) - T.shape[1]
+    values, vectors = values[:n], vectors[:, :n]
+    largest = float(np.abs(values).max(initial=0.0))
+    least = _LOWEST * largest
+    low, most = np.searchsorted(values, [least, _LOW * largest])
+    edges = np.maximum(values[max(low - 1, 0) : most + 1], least)
+    if len(edges) > 1:
+        low = max(low - 1, 0) + 1 + int(np.argmax(edges[1:] / np.maximum(edges[:-1], 1e-300)))
+    return vectors[:, :low], vectors[:, low:]
 
 
-def _split(matrix: DynamicalMatrix) -> _Split:
-    """Split the space by the singular values of C, where D is well above all of E."""
-    C, T = matrix.compatibility.toarray(), matrix.translations
-    n, n_moves = T.shape
-    # Rows that make translations the stiffest modes by far: the first, to be left out.
-    far = 4 * np.sqrt(float(np.max(abs(matrix.stiffness).sum(axis=0))) or 1.0)
-    _, sigma, right = scipy.linalg.svd(np.vstack([far * T.T, C]))
-    sigma, V = sigma[n_moves:], right[n_moves:].T
-    squares = np.zeros(n - n_moves)
-    squares[: len(sigma)] = sigma[: n - n_moves] ** 2
-    pushed = matrix.prestress @ V
-    limit = float((RANK_TOLERANCE * sigma.max(initial=0.0)) ** 2)
-    while True:
-        r = int((squares > limit).sum())
-        whole = np.diag(squares) - V.T @ pushed if r == len(squares) else None
-        Z, SZ = V[:, r:], pushed[:, r:]
-        E = np.diag(squares[r:]) - Z.T @ SZ
-        E = 0.5 * (E + E.T)
-        top = _STIFFER * float(np.abs(np.linalg.eigvalsh(E)).max(initial=0.0))
-        if r and squares[r - 1] <= top:
-            limit = top
-            continue
-        D = whole if whole is not None else np.diag(squares[:r]) - V[:, :r].T @ pushed[:, :r]
-        try:
-            factors = scipy.linalg.cho_factor(D, lower=True) if r else None
-        except np.linalg.LinAlgError:
-            limit = max(_STIFFER * limit, float(squares[r - 1]))
-            continue
-        B = -(Z.T @ pushed[:, :r])
-        return _Split(V[:, :r], Z, D, B, E, factors, sigma)
+def _singular_values(matrix: DynamicalMatrix) -> FloatArray:
+    """(min(m, n),) singular values of C, descending, known to 1e-7 of the largest."""
+    C = matrix.compatibility
+    squares = scipy.linalg.eigvalsh((C.T @ C).toarray(), overwrite_a=True, check_finite=False)
+    return np.sqrt(np.maximum(squares[::-1][: min(C.shape)], 0.0))
 
 
 class _LowModes(NamedTuple):
@@ -185,6 +125,13 @@ class _LowModes(NamedTuple):
     outside: FloatArray
     """(k,) coupling to the rest of the space."""
     quotients: Quotients
+
+
+def _turned(products: Products, vectors: FloatArray) -> FloatArray:
+    """(n, k) modes within the span of unit columns (n, k)."""
+    A, N = _within(vectors, products.images(vectors))
+    found = vectors @ scipy.linalg.eigh(A.astype(np.float64), N.astype(np.float64))[1]
+    return np.asarray(found / np.linalg.norm(found, axis=0))
 
 
 def _low_modes(products: Products, vectors: NDArray[Any], refine: bool) -> _LowModes:

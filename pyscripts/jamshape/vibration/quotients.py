@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from jamshape.arrays import FloatArray, LongArray
+from jamshape.arrays import FloatArray, IntArray, LongArray
 from jamshape.vibration.extended import EPS as LONG_EPS
 from jamshape.vibration.extended import SparseRows
 from jamshape.vibration.hessian import ROUNDINGS, DynamicalMatrix
@@ -136,15 +136,27 @@ def grouped_error(values: FloatArray, pull: FloatArray, others: FloatArray) -> F
     radius = np.sqrt((pull**2).sum(axis=0))
     distance = np.abs(values[:, None] - values)
     _, group = connected_components(CLOSE * distance <= np.maximum(pull, pull.T), directed=False)
-    bound = radius.copy()
-    for g in range(group.max(initial=-1) + 1):
-        own = group == g
-        away = (distance[~own][:, own] - radius[~own, None]).min(initial=np.inf)
-        gap = min(away, np.abs(np.subtract.outer(others, values[own])).min(initial=np.inf))
-        if gap > 0:
-            within = np.sqrt((pull[np.ix_(own, own)] ** 2).sum(axis=0))
-            bound[own] = np.minimum(radius[own], within + (pull[~own][:, own] ** 2).sum() / gap)
-    return np.asarray(bound)
+    same, squares = group[:, None] == group, pull**2
+    away = np.where(same, np.inf, distance - radius[:, None]).min(axis=0, initial=np.inf)
+    gap = _least_of_group(np.minimum(away, _distance_to(others, values)), group)
+    within = np.sqrt(np.where(same, squares, 0.0).sum(axis=0))
+    outside = np.bincount(group, np.where(same, 0.0, squares).sum(axis=0))[group]
+    far = within + outside / np.where(gap > 0, gap, 1.0)
+    return np.asarray(np.where(gap > 0, np.minimum(radius, far), radius))
+
+
+def _least_of_group(values: FloatArray, group: IntArray) -> FloatArray:
+    """(k,) smallest value in the group of each."""
+    least = np.full(len(values), np.inf)
+    np.minimum.at(least, group, values)
+    return np.asarray(least[group])
+
+
+def _distance_to(others: FloatArray, values: FloatArray) -> FloatArray:
+    """(k,) distance of each value to the nearest other."""
+    known = np.concatenate([[-np.inf], np.sort(others), [np.inf]])
+    above = np.searchsorted(known, values)
+    return np.asarray(np.minimum(known[above] - values, values - known[above - 1]))
 
 
 def norms(columns: LongArray) -> FloatArray:

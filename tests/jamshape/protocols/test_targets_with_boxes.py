@@ -74,17 +74,17 @@ def test_it_resumes_with_the_same_bits(target, tmp_path):
 
 
 def test_a_saddle_of_the_enthalpy_is_left():
-    """Minimisers stay on it by symmetry; the bordered Hessian does not."""
-    still = js.minimise(square(), pressure=1e-3, box="free", progress=False)
+    """Isotropic boxes stay on it by symmetry, which has no shear stress; the bordered Hessian does not."""
+    still = js.minimise(square(), pressure=2e-3, progress=False)
     assert stability_of(Landscape(still), State.of(still)).sign == -1
     assert abs(still.phi - np.pi / 4) < 0.01
-    stable = js.minimise(square(), pressure=1e-3, stable_to_shear=True, progress=False)
+    stable = js.minimise(still, pressure=2e-3, stable_to_shear=True, progress=False)
     assert stable.reached
     assert stable.results["tries"] > 1
     assert stable.results["bordered_eigenvalue"] > -stable.results["bordered_eigenvalue_bound"]
     assert stable.phi > 0.9  # of the hexagonal lattice, 0.9069
     tensor = js.energy(stable).pressure_tensor
-    np.testing.assert_allclose(tensor, 1e-3 * np.eye(2), atol=2e-11)
+    np.testing.assert_allclose(tensor, 2e-3 * np.eye(2), atol=4e-11)
 
 
 def test_packings_that_are_stable_to_shear():
