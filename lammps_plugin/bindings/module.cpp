@@ -25,6 +25,7 @@ void export_local_energy_model(nanobind::module_ &m);
 void export_stages(nanobind::module_ &m);
 void export_descent(nanobind::module_ &m);
 void export_rattlers(nanobind::module_ &m);
+void export_sparse_product(nanobind::module_ &m);
 void export_probes(nanobind::module_ &m);
 }  // namespace jamshape
 
@@ -40,6 +41,7 @@ NB_MODULE(_contact, m)
   jamshape::export_stages(m);
   jamshape::export_descent(m);
   jamshape::export_rattlers(m);
+  jamshape::export_sparse_product(m);
   jamshape::export_probes(m);
   m.def("instruction_sets", &jamshape::instruction_sets,
         "Instruction sets of this machine that contacts in packs are compiled for, as the\n"

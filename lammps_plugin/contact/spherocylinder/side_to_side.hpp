@@ -14,8 +14,8 @@ inline constexpr double FADE_LENGTH = 0.05;
 inline constexpr double FADE_GROWTH = 4.0;
 inline constexpr double LEAST_END_EXPONENT = 1e-12;
 
-/// Share of the energy below which a second bond does not count: near where it underflows, numbers of
-/// bonds would depend on the processor.
+/// Share of the energy below which a second bond does not count: near where it underflows, numbers
+/// of bonds would depend on the processor.
 inline constexpr double LEAST_SHARE = 1e-100;
 
 /// A function's value, and its derivative.

@@ -7,7 +7,6 @@ of its mode, in long double.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -112,7 +111,7 @@ def _singular_values(matrix: DynamicalMatrix) -> FloatArray:
     """(min(m, n),) singular values of C, descending, known to 1e-7 of the largest."""
     C = matrix.compatibility
     squares = scipy.linalg.eigvalsh((C.T @ C).toarray(), overwrite_a=True, check_finite=False)
-    return np.sqrt(np.maximum(squares[::-1][: min(C.shape)], 0.0))
+    return np.asarray(np.sqrt(np.maximum(squares[::-1][: min(C.shape)], 0.0)))
 
 
 class _LowModes(NamedTuple):

@@ -1,6 +1,6 @@
 """Matrix products in extended precision: long doubles for sparse factors, slices for dense ones.
 
-NumPy multiplies long doubles one by one, which suffices for sparse factors with few entries a row. Dense
+Processors multiply long doubles one by one, which suffices for sparse factors with few entries a row. Dense
 factors are cut into slices of so few bits that BLAS multiplies them without rounding (Ozaki, Ogita, Oishi
 and Rump, Numer. Algorithms 59, 95 (2012)).
 """
@@ -13,12 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from jamshape.arrays import FloatArray, IntArray, LongArray
+from jamshape import _contact
+from jamshape.arrays import FloatArray, LongArray
 
 EPS = float(np.finfo(np.longdouble).eps)
-
-# Columns of a dense factor processed at once, to bound memory.
-_COLUMNS = 128
 
 # Required bits of a product: those of a long double.
 _BITS = 64
@@ -34,26 +32,22 @@ class SparseRows:
 
     def __init__(self, matrix: Any) -> None:
         matrix = matrix.tocsr()
-        counts = np.diff(matrix.indptr)
         self.shape = matrix.shape
-        row = np.repeat(np.arange(matrix.shape[0]), counts)
-        slot = np.arange(matrix.nnz) - matrix.indptr[row]
-        width = int(counts.max(initial=0))
-        self._column: IntArray = np.zeros((width, matrix.shape[0]), np.int64)
-        self._value: FloatArray = np.zeros((width, matrix.shape[0]))
-        self._column[slot, row], self._value[slot, row] = matrix.indices, matrix.data
+        self._first, self._column = (
+            np.asarray(a, np.int64) for a in (matrix.indptr, matrix.indices)
+        )
+        self._value = np.asarray(matrix.data, np.float64)
 
     def __matmul__(self, dense: NDArray[Any]) -> LongArray:
         """(m, k) product with an (n, k) matrix, or (m,) with an (n,) vector."""
         if dense.ndim == 1:
             return np.asarray((self @ dense[:, None])[:, 0])
-        result = np.zeros((self.shape[0], dense.shape[1]), np.longdouble)
-        for first in range(0, dense.shape[1], _COLUMNS):
-            columns = np.asarray(dense[:, first : first + _COLUMNS], np.longdouble)
-            part = result[:, first : first + _COLUMNS]
-            for column, value in zip(self._column, self._value, strict=True):
-                part += value[:, None] * columns[column]
-        return result
+        is_long = dense.dtype == np.longdouble
+        numbers = np.ascontiguousarray(dense if is_long else dense.astype(np.float64, copy=False))
+        found = _contact.sparse_product(
+            self._first, self._column, self._value, numbers.view(np.float64), is_long
+        )
+        return np.asarray(found.view(np.longdouble))
 
 
 def dense_product(a: NDArray[Any], b: NDArray[Any]) -> LongArray:

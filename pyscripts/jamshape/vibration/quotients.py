@@ -61,8 +61,8 @@ class Products:
 
     def images(self, vectors: NDArray[Any]) -> Images:
         """Multiply unit columns (n, k)."""
+        stretched, pushed = self.C @ vectors, self.S @ vectors
         v = np.asarray(vectors, np.longdouble)
-        stretched, pushed = self.C @ v, self.S @ v
         square = (v**2).sum(axis=0)
         value = ((stretched**2).sum(axis=0) - (v * pushed).sum(axis=0)) / square
         residual = self.Ct @ stretched - pushed - value * v
