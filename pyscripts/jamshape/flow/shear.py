@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from jamshape.checks import MOST_STEPS, RANGES, require_in, require_one_of, require_positive
+from jamshape.flow.box_control import BoxControl
 from jamshape.flow.motion import FlowRun, Motion
 
 if TYPE_CHECKING:
@@ -125,16 +126,9 @@ class Shear(Shearing):
 
     def __post_init__(self) -> None:
         require_positive(gdot=self.gdot, strain_end=self.strain_end)
-        if self.hold_pressure is not None and self.t_box is not None:
-            require_positive(hold_pressure=self.hold_pressure, t_box=self.t_box)
-            object.__setattr__(self, "hold_pressure", float(self.hold_pressure))
-            object.__setattr__(self, "t_box", float(self.t_box))
-            if self.flow != "simple":
-                msg = f"flow {self.flow} drives the height of the box, which a pressure needs, expected flow simple or no pressure"
-                raise ValueError(msg)
-        elif self.hold_pressure is not None or self.t_box is not None:
-            msg = f"pressure {self.hold_pressure} and t_box {self.t_box}, expected both or neither"
-            raise ValueError(msg)
+        if held := BoxControl.of_shear(self.hold_pressure, self.t_box, self.flow):
+            object.__setattr__(self, "hold_pressure", held.pressure)
+            object.__setattr__(self, "t_box", held.t_box)
         if self.flow == "pure":
             require_in("strain", self.strain_end, RANGES["pure_strain"])
         super().__post_init__()
