@@ -674,14 +674,14 @@ class ImplicitFlow:
             assert self.flow._border is not None
             stiffness = secant.stiffness((x[-1], force[-1]), drag[-1], self.flow._border)
             correction = self.flow._border.solve(np.zeros(n), force, stiffness)
-            if how.units.size(correction, force, drag) <= how.tolerance:
-                return found.evaluation, x, velocity
             guess = x + correction
             if self.box.is_beyond(guess[-1], _OVERSTRAINED * self.protocol.largest_strain):
                 return None
             path.strain_to(guess[-1])
             centre = path.combined(times)
             velocity = (guess - centre) / own
+            if how.units.size(correction, force, drag) <= how.tolerance:
+                return found.evaluation, guess, velocity
         return None
 
     def _response(self, force: FloatArray, drag: FloatArray) -> FloatArray:
@@ -742,6 +742,8 @@ class ImplicitFlow:
     def _accept(self, attempt: _Attempt, dt: float) -> None:
         flow, path = self.flow, attempt.path
         begun, acceleration = (path.carried(v) for v in (flow.velocity, flow.acceleration))
+        if self.box:  # as the last correction left it
+            path.go_to_stage()
         self.local_model.move(attempt.x, 0.0)
         flow.state, flow._here = self.local_model.base, attempt.evaluation
         # Velocities jump when contacts open or close: extrapolation is then less accurate.
