@@ -129,6 +129,7 @@ class YieldingBox:
         self._n_axes = float(self.axes.sum())
         self.length = 2 * float(landscape.inner_radius.mean()) * math.sqrt(particles.n)
         """q over the strain, [length]."""
+        self._unit: LongArray = np.diag(self.axes).astype(np.longdouble)
         resistance = self._n_axes * control.t_box * landscape.stiffness * particles.n
         self.drag = resistance / self.length**2
         """Drag coefficient of q, [energy time / length^2]."""
@@ -137,8 +138,7 @@ class YieldingBox:
 
     def strain(self, q: float) -> LongArray:
         """(D, D) logarithmic strain."""
-        found: LongArray = np.diag(self.axes).astype(np.longdouble) * (q / self.length)
-        return found
+        return self._unit * (q / self.length)
 
     def growth(self, q: float) -> float:
         """Return the volume over that at q = 0."""

@@ -59,9 +59,9 @@ _EXPLICIT_BELOW = 0.5  # longest explicit step, in drag over stiffness
 _EXPLICIT_IN_A_ROW = 20
 _LEAST_STEP = 1e-3  # shortest explicit step, over the longest
 
-# Most solutions of a stage in a box that yields, and the largest strain of such a box over that of a step.
+# Most solutions of a stage in a box that yields, largest strain in a step by its rate at the start, and at the end.
 _BOXES = 12
-_OVERSTRAINED = 4.0
+_YIELDED, _OVERSTRAINED = 1e-3, 4e-3
 
 # Spines that cross within this fraction of the times of contacts and of the box cross at any step.
 _AT_ONCE = 1e-9
@@ -396,6 +396,8 @@ class _Accuracy(NamedTuple):
     units: Units
     tolerance: float
     """Largest correction, in these units."""
+    overlap: float
+    """Typical overlap, over the size."""
     extended: bool
 
 
@@ -454,7 +456,7 @@ class ImplicitFlow:
         self.orientation = flow.state.orientation.astype(np.float64)
         self.host, longest = self.protocol.leg(flow, self.phi)
         # Stage accuracy suffices for units and energies.
-        here = flow._here or self._evaluated()
+        here = flow._here or self._present()
         if not flow.velocity.size:
             self._begin(here)
         while True:
@@ -473,7 +475,7 @@ class ImplicitFlow:
     def _next_trial(self, longest: float) -> _Trial:
         """Choose the step to try, within the period of the host."""
         flow = self.flow
-        dt = min(flow.dt, self.protocol.largest_strain / self._rate)
+        dt = min(flow.dt, self._longest_by_strain)
         clipped = dt >= 0.999 * longest
         dt = longest if clipped else dt
         explicit = flow.explicit_left > 0 or dt < self._stable
@@ -537,12 +539,25 @@ class ImplicitFlow:
     def _refuse_crossing(self, dt: float) -> None:
         if self._crossing is None or dt > _AT_ONCE * min(self._stable, 1 / self._rate):
             return
-        spines = str(self._crossing).partition(",")[0]
+        raise self._crossed(self._crossing)
+
+    def _present(self) -> Evaluation:
+        """Evaluate the present state; refuse spines that the last correction crossed."""
+        try:
+            return self._evaluated()
+        except CrossingError as error:
+            if self.flow.steps == 0:
+                raise
+            raise self._crossed(error) from None
+
+    def _crossed(self, error: CrossingError) -> CrossingError:
+        spines = str(error).partition(",")[0]
+        pushes, less = (" and a pressure", ", use a smaller pressure") if self.box else ("", "")
         msg = (
-            f"{spines} {self.protocol.where(self.phi)}, expected a rate that their contacts withstand; flow"
-            " more slowly, or end earlier"
+            f"{spines} {self.protocol.where(self.phi)}, expected a rate{pushes} that their contacts withstand; flow"
+            f" more slowly{less}, or end earlier"
         )
-        raise CrossingError(msg)
+        return CrossingError(msg)
 
     def _falls_too_far(self, now: Evaluation, before: Evaluation) -> bool:
         # Contacts no stronger than the drag of the box motion open and close without an event.
@@ -563,9 +578,19 @@ class ImplicitFlow:
     @property
     def _rate(self) -> float:
         """Largest of the rates of the host, [1/time]; also that at which the box yields."""
-        if self.box is None:
-            return self.host.rate
-        return max(self.host.rate, abs(float(self.flow.velocity[-1])) / self.box.length, 1e-300)
+        return max(self.host.rate, self._yield_rate) if self.box else self.host.rate
+
+    @property
+    def _yield_rate(self) -> float:
+        """Rate at which a box yields, [1/time], not zero."""
+        assert self.box is not None
+        return max(abs(float(self.flow.velocity[-1])) / self.box.length, 1e-300)
+
+    @property
+    def _longest_by_strain(self) -> float:
+        """Longest step by the largest strain, [time]."""
+        longest = self.protocol.largest_strain / self.host.rate if self.host.rate else math.inf
+        return min(longest, _YIELDED / self._yield_rate) if self.box else longest
 
     def _slope(self, evaluation: Evaluation, growth: float = 1.0) -> FloatArray:
         """Return the derivatives of energy or enthalpy, with the growth of the volume since the start of the step."""
@@ -586,7 +611,7 @@ class ImplicitFlow:
             speed = self._rms(flow.velocity)
             flow.dt = min(
                 0.1 * self.protocol.tolerance**0.5 * self._unit(here) / max(speed, 1e-300),
-                0.01 * self.protocol.largest_strain / self._rate,
+                0.01 * self._longest_by_strain,
             )
 
     def _unit(self, evaluation: Evaluation) -> float:
@@ -626,7 +651,7 @@ class ImplicitFlow:
         if not 1 / _SAME_STEP < dt / max(flow._dt_of_factors, 1e-300) < _SAME_STEP:
             flow._factors = None
         path = _Path(self, [dt * part for part in method.times])
-        how = _Accuracy(units, accuracy, self._is_extended(unit))
+        how = _Accuracy(units, accuracy, unit / self.size, self._is_extended(unit))
         evaluation, last = here, self.still
         for k, row in enumerate(method.weights):
             if row[k] == 0.0:
@@ -654,9 +679,13 @@ class ImplicitFlow:
         own, n = times[len(path.velocities)], self.landscape.size
         drag = self.drag / own
         if self.box:  # whose guess does not depend on the transport of others
-            path.strain_to((path.combined(times) + own * self._predicted(path))[-1])
+            guessed = (path.combined(times) + own * self._predicted(path))[-1]
+            # Its last rate says nothing about times beyond its relaxation: there the box begins as it was.
+            if not self.box.is_beyond(guessed - path.strained, how.overlap):
+                path.strain_to(guessed)
         centre, velocity = path.combined(times), self._predicted(path)
         guess, secant = centre + own * velocity, Secant()
+        guess[n:] = path.strained
         for _ in range(_BOXES if self.box else 1):
             path.go_to_stage()
             pushed = centre[:n] + own * path.turning.excess(guess[:n], velocity[:n])
@@ -675,7 +704,7 @@ class ImplicitFlow:
             stiffness = secant.stiffness((x[-1], force[-1]), drag[-1], self.flow._border)
             correction = self.flow._border.solve(np.zeros(n), force, stiffness)
             guess = x + correction
-            if self.box.is_beyond(guess[-1], _OVERSTRAINED * self.protocol.largest_strain):
+            if self.box.is_beyond(guess[-1], _OVERSTRAINED):
                 return None
             path.strain_to(guess[-1])
             centre = path.combined(times)

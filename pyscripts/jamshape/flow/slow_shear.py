@@ -79,13 +79,17 @@ class SlowShear:
         stress = ShearStress.of(tensor)._asdict()
         held = {"p_yy": float(tensor[1, 1])} if self.control else {}
         order = nematic_of(packing)
-        return stress | held | {
-            f"{'shear' if self.flow == 'simple' else 'pure'}_strain": flow.strain,
-            "z": Contacts.of(packing, landscape.k_e, landscape.sides).z,
-            "S_2": order.S_n,
-            "director": order.theta_n,
-            "turned": flow.turned if landscape.rotation_length.any() else 0.0,
-        }
+        return (
+            stress
+            | held
+            | {
+                f"{'shear' if self.flow == 'simple' else 'pure'}_strain": flow.strain,
+                "z": Contacts.of(packing, landscape.k_e, landscape.sides).z,
+                "S_2": order.S_n,
+                "director": order.theta_n,
+                "turned": flow.turned if landscape.rotation_length.any() else 0.0,
+            }
+        )
 
     def where(self, phi: float) -> str:
         """Describe the position, for messages."""

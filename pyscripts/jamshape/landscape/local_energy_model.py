@@ -231,7 +231,9 @@ class LocalEnergyModel:
         return LONGEST_STEP * 0.5 * self.landscape.length
 
     def _accepted(self, found: Any) -> Evaluation:
-        energy, gradient, strain_gradient, bond_force, n_bonds, crossing, unconverged, virial = found
+        energy, gradient, strain_gradient, bond_force, n_bonds, crossing, unconverged, virial = (
+            found
+        )
         self.landscape.refuse(self._pairs, crossing, unconverged)
         bond_force /= max(n_bonds, 1)
         virial = virial.reshape(self.base.dimension, -1)
