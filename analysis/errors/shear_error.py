@@ -6,8 +6,8 @@ Rods (alpha = 4), nearly round ones (alpha = 0.01) and discs, `sides two`, near 
 and then with each integrator and tolerance over a strain of 0.02, in which rearrangements begin to tell runs apart; errors of
 the pressure at forty strains are against rkc2 with a tolerance of 1e-7 (1e-6 at rates of 1e-6). Heun's method runs for a short stretch, and its
 cost is extrapolated. Writes a table (Markdown), a picture and the numbers (JSON); finished runs are kept and not repeated.
-Seconds are of the processor. With --pressure the height of the box yields to that normal pressure, also before, and errors are
-those of the packing fraction. The last line of standard output is one JSON object.
+Seconds are of the processor. With --pressure the height of the box yields to that normal pressure, also
+before. The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class Case(NamedTuple):
 
 
 class Row(NamedTuple):
-    """Cost of a method, and its relative errors of the pressure, or of the packing fraction at a pressure."""
+    """Cost of a method, and its relative errors of the pressure."""
 
     n: int
     alpha: float
@@ -119,25 +119,24 @@ def start_state(folder: Path, case: Case) -> Packing:
 
 
 def explicit(start: Packing, settings: Shear, rows: int) -> dict[str, Any]:
-    """Pressures, or packing fractions at a pressure, at the rows of a run in LAMMPS, and the cost."""
-    measured = "phi" if settings.hold_pressure else "pressure"
+    """Pressures at the rows of a run in LAMMPS, and the cost."""
     with Session() as session:
         shear = ShearRun(session, settings, start)
         began, p, per_row = time.process_time(), [], shear.last_step // rows
         for k in range(1, rows + 1):
             shear.advance(k * per_row)
-            p.append(shear.measure()[measured])
+            p.append(shear.measure()["pressure"])
         seconds = time.process_time() - began
         return {"pressure": p, "seconds": seconds, "evaluations": shear.measure()["evaluations"]}
 
 
 def implicit(start: Packing, course: SlowShear) -> dict[str, Any]:
-    """Return the same of a run by implicit steps."""
+    """Pressures at the rows of a run by implicit steps, and the cost."""
     landscape, flow, p = Landscape(start), Flow(State.of(start)), []
     began = time.process_time()
     for k in range(1, ROWS + 1):
         *_, last = follow(landscape, flow, replace(course, strain_end=k * STRAIN / ROWS))
-        p.append(last.phi if course.control else last.pressure)
+        p.append(last.pressure)
     seconds = time.process_time() - began
     return {"pressure": p, "seconds": seconds, "evaluations": float(flow.evaluations)}
 
@@ -189,9 +188,8 @@ def rows_of(folder: Path, case: Case) -> Iterator[Row]:
 
 def table(rows: list[Row]) -> str:
     """Write the rows as Markdown."""
-    of = "phi" if any(r.pressure for r in rows) else "p"
     heads = ("N", "alpha", "gdot", "integrator", "tolerance", "evaluations", "seconds",
-             f"{of}: median error", "largest")  # fmt: skip
+             "p: median error", "largest")  # fmt: skip
     extrapolated = f"dt = {HEUN_DT}, extrapolated"
     return markdown(heads, [
         (str(r.n), f"{r.alpha:g}", f"{r.gdot:g}", r.method,
@@ -206,10 +204,8 @@ def draw(rows: list[Row], path: Path) -> None:
     cases = list(dict.fromkeys(r.case for r in rows))
     columns = len({case.gdot for case in cases})
     lines = -(-len(cases) // columns)
-    of_phi = cases[0].pressure > 0
-    name, symbol = ("packing fraction", r"\phi") if of_phi else ("pressure", "p")
     figure = figure_of(
-        3.4 * columns, 2.9 * lines, f"error of the {name} against run time under shear"
+        3.4 * columns, 2.9 * lines, "error of the pressure against run time under shear"
     )
     panels = figure.subplots(lines, columns, squeeze=False, sharex=True, sharey=True)
     for axis, case in zip(panels.flat, cases, strict=False):
@@ -221,7 +217,7 @@ def draw(rows: list[Row], path: Path) -> None:
         axis.set_title(title, fontsize=9)
         axis.grid(visible=True, alpha=0.3)
     for axis in panels[:, 0]:
-        axis.set_ylabel(f"relative error of ${symbol}$")
+        axis.set_ylabel("relative error of $p$")
     for axis in panels[-1]:
         axis.set_xlabel("seconds of the processor")
     name_median_and_largest(panels[0, 0])
