@@ -222,6 +222,26 @@ void export_constructors()
   });
 }
 
+void export_strains()
+{
+  using namespace nb::literals;
+  nb::borrow<nb::class_<LocalEnergyModel>>(nb::type<LocalEnergyModel>())
+      .def("strain_along", &strain_along, "axes"_a,
+           "From now on coupling and strain_curvature are about the strain of these axes (D,),\n"
+           "0 or 1 each; at first of all axes.")
+      .def_prop_ro(
+          "coupling",
+          [](const LocalEnergyModel &of) {
+            const Eigen::VectorXd &found = of.coupling();
+            return array_of(found.data(), found.size());
+          },
+          "Derivative (n,) of the gradient with respect to the strain, where a Hessian was last "
+          "made;\n"
+          "empty before.")
+      .def_prop_ro("strain_curvature", &LocalEnergyModel::strain_curvature,
+                   "Second derivative of the energy with respect to the strain, there.");
+}
+
 }  // namespace
 
 void export_local_energy_model(nb::module_ &m)
@@ -259,20 +279,6 @@ void export_local_energy_model(nb::module_ &m)
            "magnitudes of bond forces, number of bonds, the index of a pair that crosses and of\n"
            "one that is unconverged, or -1, and the virial (D D,); None if the pairs no longer "
            "hold.")
-      .def("strain_along", &strain_along, "axes"_a,
-           "From now on coupling and strain_curvature are about the strain of these axes (D,),\n"
-           "0 or 1 each; at first of all axes.")
-      .def_prop_ro(
-          "coupling",
-          [](const LocalEnergyModel &of) {
-            const Eigen::VectorXd &found = of.coupling();
-            return array_of(found.data(), found.size());
-          },
-          "Derivative (n,) of the gradient with respect to the strain, where a Hessian was last "
-          "made;\n"
-          "empty before.")
-      .def_prop_ro("strain_curvature", &LocalEnergyModel::strain_curvature,
-                   "Second derivative of the energy with respect to the strain, there.")
       .def("factorise", &factorise, "x"_a, "strain"_a, "diagonal"_a,
            "Factors of the Hessian in these coordinates plus a diagonal (n,), shifted if it is\n"
            "not positive definite.")
@@ -289,6 +295,7 @@ void export_local_energy_model(nb::module_ &m)
           "Take all pairs of surfaces closer than a wide skin at these poses, and of centres\n"
           "closer than reach; those within skin are chosen among them as particles move.");
 
+  export_strains();
   export_constructors();
 }
 

@@ -148,11 +148,9 @@ def shear(
     held = _held(pressure, t_box, gdot, flow)
     if integrator in METHODS:
         require_no_effect("integrator", integrator, dt=dt, frames=frames)
-        longest = min(SlowShear.largest_strain, strain / rows)
+        most = min(SlowShear.largest_strain, strain / rows)
         error = integration_tolerance or _IMPLICIT_ERROR
-        slow = SlowShear(
-            gdot, strain, flow, error, largest_strain=longest, method=integrator, **held
-        )
+        slow = SlowShear(gdot, strain, flow, error, largest_strain=most, method=integrator, **held)
         _require_two_bonds(sides)
         made_from = of.made_from | {"rows": rows, "dimension": of.dimension}
         plan = implicit_driver.plan(lambda: _flowing(of), slow, made_from)
