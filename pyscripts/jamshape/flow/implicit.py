@@ -620,7 +620,7 @@ class ImplicitFlow:
         return max(evaluation.bond_force, least) * self.size**2 / self.landscape.stiffness
 
     def _rms(self, vector: FloatArray) -> float:
-        """Root mean square over particles of an (n,) vector of coordinates."""
+        """Root mean square over particles of a vector of coordinates."""
         return float(np.linalg.norm(vector)) / math.sqrt(self.landscape.particles.n)
 
     def _units(self, evaluation: Evaluation) -> Units:
@@ -698,8 +698,8 @@ class ImplicitFlow:
             velocity = (x - centre) / own
             if self.box is None:
                 return found.evaluation, x, velocity
-            slope = self._slope(found.evaluation, path.growth)
-            force = np.append(np.zeros(n), -(drag * (x - centre) + slope)[-1])
+            slope = self.box.slope(found.evaluation, path.growth * self.flow.state.volume)
+            force = np.append(np.zeros(n), -drag[-1] * (x - centre)[-1] - slope)
             assert self.flow._border is not None
             stiffness = secant.stiffness((x[-1], force[-1]), drag[-1], self.flow._border)
             correction = self.flow._border.solve(np.zeros(n), force, stiffness)
@@ -714,7 +714,7 @@ class ImplicitFlow:
         return None
 
     def _response(self, force: FloatArray, drag: FloatArray) -> FloatArray:
-        """Return the displacement by a force, about the last stage."""
+        """Return the displacement of particles and box by a force, from the factors of the last stage."""
         factors, border = self.flow._factors, self.flow._border
         assert factors is not None
         inner = factors.factors.solve(force[: self.landscape.size])

@@ -72,24 +72,19 @@ class SlowShear:
         return flow.strain >= self.strain_end * (1 - 1e-12)
 
     def measured(self, landscape: Landscape, flow: Flow) -> dict[str, float]:
-        """Return stress, contacts, order and rotation, named as those of `jamshape.flow.shear`."""
+        """Return stress, a held pressure, contacts, order and rotation, named as those of `jamshape.flow.shear`."""
         state = flow.state
         packing = state.packing(landscape.particles)
         tensor = landscape.stress(state)
-        stress = ShearStress.of(tensor)._asdict()
-        held = {"p_yy": float(tensor[1, 1])} if self.control else {}
         order = nematic_of(packing)
-        return (
-            stress
-            | held
-            | {
-                f"{'shear' if self.flow == 'simple' else 'pure'}_strain": flow.strain,
-                "z": Contacts.of(packing, landscape.k_e, landscape.sides).z,
-                "S_2": order.S_n,
-                "director": order.theta_n,
-                "turned": flow.turned if landscape.rotation_length.any() else 0.0,
-            }
-        )
+        found = ShearStress.of(tensor)._asdict() | {
+            f"{'shear' if self.flow == 'simple' else 'pure'}_strain": flow.strain,
+            "z": Contacts.of(packing, landscape.k_e, landscape.sides).z,
+            "S_2": order.S_n,
+            "director": order.theta_n,
+            "turned": flow.turned if landscape.rotation_length.any() else 0.0,
+        }
+        return found | {"p_yy": float(tensor[1, 1])} if self.control else found
 
     def where(self, phi: float) -> str:
         """Describe the position, for messages."""
