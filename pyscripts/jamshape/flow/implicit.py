@@ -475,7 +475,7 @@ class ImplicitFlow:
     def _next_trial(self, longest: float) -> _Trial:
         """Choose the step to try, within the period of the host."""
         flow = self.flow
-        dt = min(flow.dt, self._longest_by_strain)
+        dt = min(flow.dt, self._time_of_strain(1.0))
         clipped = dt >= 0.999 * longest
         dt = longest if clipped else dt
         explicit = flow.explicit_left > 0 or dt < self._stable
@@ -586,11 +586,12 @@ class ImplicitFlow:
         assert self.box is not None
         return max(abs(float(self.flow.velocity[-1])) / self.box.length, 1e-300)
 
-    @property
-    def _longest_by_strain(self) -> float:
-        """Longest step by the largest strain, [time]."""
-        longest = self.protocol.largest_strain / self.host.rate if self.host.rate else math.inf
-        return min(longest, _YIELDED / self._yield_rate) if self.box else longest
+    def _time_of_strain(self, part: float) -> float:
+        """Return the time of a part of the largest strain of a step."""
+        rate, most = self.host.rate, part * self.protocol.largest_strain
+        if self.box is None:
+            return most / rate
+        return min(most / rate if rate else math.inf, part * _YIELDED / self._yield_rate)
 
     def _slope(self, evaluation: Evaluation, growth: float = 1.0) -> FloatArray:
         """Return the derivatives of energy or enthalpy, with the growth of the volume since the start of the step."""
@@ -611,7 +612,7 @@ class ImplicitFlow:
             speed = self._rms(flow.velocity)
             flow.dt = min(
                 0.1 * self.protocol.tolerance**0.5 * self._unit(here) / max(speed, 1e-300),
-                0.01 * self._longest_by_strain,
+                self._time_of_strain(0.01),
             )
 
     def _unit(self, evaluation: Evaluation) -> float:
