@@ -231,7 +231,7 @@ def parser() -> ArgumentParser:
     found.add_argument("--alpha", type=float, nargs="+", default=list(PHI), choices=list(PHI))
     found.add_argument("--gdot", type=float, nargs="+", default=[1e-4, 1e-5, 1e-6])
     found.add_argument(
-        "--pressure", type=float, default=0.0, help="normal pressure to hold (0 holds the volume)"
+        "--pressure", type=float, default=0.0, help="normal pressure to hold, instead of the volume"
     )
     found.add_argument("--quick", action="store_true", help="N = 16, gdot = 1e-4, alpha = 4")
     return found
