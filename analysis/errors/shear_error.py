@@ -231,7 +231,7 @@ def parser() -> ArgumentParser:
     found.add_argument("--alpha", type=float, nargs="+", default=list(PHI), choices=list(PHI))
     found.add_argument("--gdot", type=float, nargs="+", default=[1e-4, 1e-5, 1e-6])
     found.add_argument(
-        "--pressure", type=float, default=0.0, help="normal pressure to hold, instead of the volume"
+        "--pressure", type=float, help="normal pressure to hold, instead of the volume"
     )
     found.add_argument("--quick", action="store_true", help="N = 16, gdot = 1e-4, alpha = 4")
     return found
@@ -243,7 +243,7 @@ def main(options: Namespace) -> None:
     if options.quick:
         options.n, options.gdot, options.alpha = [16], [1e-4], [4.0]
     cases = [
-        Case(n, alpha, gdot, options.pressure)
+        Case(n, alpha, gdot, options.pressure or 0.0)
         for n, alpha, gdot in itertools.product(options.n, options.alpha, options.gdot)
     ]
     rows: list[Row] = []
