@@ -6,7 +6,8 @@ Rods (alpha = 4), nearly round ones (alpha = 0.01) and discs, `sides two`, near 
 and then with each integrator and tolerance over a strain of 0.02, in which rearrangements begin to tell runs apart; errors of
 the pressure at forty strains are against rkc2 with a tolerance of 1e-7 (1e-6 at rates of 1e-6). Heun's method runs for a short stretch, and its
 cost is extrapolated. Writes a table (Markdown), a picture and the numbers (JSON); finished runs are kept and not repeated.
-Seconds are of the processor. The last line of standard output is one JSON object.
+Seconds are of the processor. With --pressure the height of the box yields to that normal pressure, also
+before. The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations
@@ -52,6 +53,7 @@ METHODS = (
     ("tr-bdf2", 1e-2), ("tr-bdf2", 1e-3), ("tr-bdf2", 1e-4),
 )  # fmt: skip
 HEUN_DT, HEUN_STEPS = 0.05, 2000
+BOX_STRAIN = 0.01  # strain in whose time the height of a box at a pressure relaxes
 SLOW = 1e-6
 COLOURS = {"heun": "0.4", "heun/adaptive": "C0", "rkc2": "C1", "tr-bdf2": "C2"}
 
@@ -62,6 +64,14 @@ class Case(NamedTuple):
     n: int
     alpha: float
     gdot: float
+    pressure: float = 0.0
+
+    @property
+    def held(self) -> dict[str, Any]:
+        """Settings of a pressure to hold."""
+        if not self.pressure:
+            return {}
+        return {"hold_pressure": self.pressure, "t_box": BOX_STRAIN / self.gdot}
 
     @property
     def finest(self) -> float:
@@ -71,7 +81,8 @@ class Case(NamedTuple):
     @property
     def name(self) -> str:
         """Name in files."""
-        return f"n{self.n}_alpha{self.alpha:g}_gdot{self.gdot:g}"
+        held = f"_p{self.pressure:g}" if self.pressure else ""
+        return f"n{self.n}_alpha{self.alpha:g}_gdot{self.gdot:g}{held}"
 
 
 class Row(NamedTuple):
@@ -80,6 +91,7 @@ class Row(NamedTuple):
     n: int
     alpha: float
     gdot: float
+    pressure: float
     method: str
     tolerance: float | None
     evaluations: float
@@ -90,7 +102,7 @@ class Row(NamedTuple):
     @property
     def case(self) -> Case:
         """Its shear."""
-        return Case(self.n, self.alpha, self.gdot)
+        return Case(self.n, self.alpha, self.gdot, self.pressure)
 
 
 def start_state(folder: Path, case: Case) -> Packing:
@@ -99,10 +111,11 @@ def start_state(folder: Path, case: Case) -> Packing:
     def make() -> Packing:
         particles = js.Spherocylinders(alpha=case.alpha)
         run = js.shear(particles, n=case.n, phi=PHI[case.alpha], gdot=RATE_BEFORE, strain=BEFORE,
-                       rows=50, frames=1, progress=False)  # fmt: skip
+                       pressure=case.pressure, rows=50, frames=1, progress=False)  # fmt: skip
         return read_packing(run.file)
 
-    return kept_packing(folder / f"start_n{case.n}_alpha{case.alpha:g}.h5", make)
+    held = f"_p{case.pressure:g}" if case.pressure else ""
+    return kept_packing(folder / f"start_n{case.n}_alpha{case.alpha:g}{held}.h5", make)
 
 
 def explicit(start: Packing, settings: Shear, rows: int) -> dict[str, Any]:
@@ -134,10 +147,10 @@ def found_by(folder: Path, case: Case, method: str, tolerance: float) -> dict[st
     def make() -> dict[str, Any]:
         start = start_state(folder, case)
         if method in IMPLICIT:
-            return implicit(start, SlowShear(case.gdot, STRAIN, tolerance=tolerance, method=method))
-        settings = Shear(
-            gdot=case.gdot, strain_end=STRAIN, sides=2, integrator=method, tolerance=tolerance
-        )
+            slow = SlowShear(case.gdot, STRAIN, tolerance=tolerance, method=method, **case.held)
+            return implicit(start, slow)
+        settings = Shear(gdot=case.gdot, strain_end=STRAIN, sides=2, integrator=method, tolerance=tolerance,
+                         **case.held)  # fmt: skip
         return explicit(start, settings.in_steps(ROWS), ROWS)
 
     return kept(folder / f"{case.name}_{method.replace('/', '-')}_{tolerance:g}.json", make)
@@ -149,9 +162,11 @@ def heun(folder: Path, case: Case) -> dict[str, Any]:
     def make() -> dict[str, Any]:
         start, stretch = start_state(folder, case), HEUN_STEPS * HEUN_DT * case.gdot
         fine = Shear(gdot=case.gdot, strain_end=stretch, sides=2, integrator=REFERENCE,
-                     tolerance=case.finest)  # fmt: skip
+                     tolerance=case.finest, **case.held)  # fmt: skip
         exact = explicit(start, fine.in_steps(1), 1)["pressure"][-1]
-        found = explicit(start, Shear(gdot=case.gdot, strain_end=stretch, sides=2, dt=HEUN_DT), 1)
+        found = explicit(
+            start, Shear(gdot=case.gdot, strain_end=stretch, sides=2, dt=HEUN_DT, **case.held), 1
+        )
         times = STRAIN / stretch
         cost = {name: found[name] * times for name in ("seconds", "evaluations")}
         return cost | {"error": abs(found["pressure"][-1] / exact - 1)}
@@ -215,6 +230,9 @@ def parser() -> ArgumentParser:
     found.add_argument("--n", type=int, nargs="+", default=[128])
     found.add_argument("--alpha", type=float, nargs="+", default=list(PHI), choices=list(PHI))
     found.add_argument("--gdot", type=float, nargs="+", default=[1e-4, 1e-5, 1e-6])
+    found.add_argument(
+        "--pressure", type=float, help="normal pressure to hold, instead of the volume"
+    )
     found.add_argument("--quick", action="store_true", help="N = 16, gdot = 1e-4, alpha = 4")
     return found
 
@@ -225,7 +243,7 @@ def main(options: Namespace) -> None:
     if options.quick:
         options.n, options.gdot, options.alpha = [16], [1e-4], [4.0]
     cases = [
-        Case(n, alpha, gdot)
+        Case(n, alpha, gdot, options.pressure or 0.0)
         for n, alpha, gdot in itertools.product(options.n, options.alpha, options.gdot)
     ]
     rows: list[Row] = []

@@ -47,7 +47,7 @@ def point_of(alpha: float, gdot: float, options: Namespace) -> Point:
     path.parent.mkdir(parents=True, exist_ok=True)
     made = js.shear(
         particles, n=options.n, gdot=gdot, strain=options.strain, pressure=options.pressure,
-        integration_tolerance=1e-3, frames=2, file=path,
+        integration_tolerance=1e-3, file=path,
     )  # fmt: skip
     steady = made.steady()
     return Point(alpha, gdot, gdot / steady["p_yy"].value, steady["friction"], steady["phi"])

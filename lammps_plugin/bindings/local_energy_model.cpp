@@ -158,6 +158,14 @@ void deform(LocalEnergyModel &of, const Array3<double> &matrix, const Array2<dou
   of.deform(rows, turns.data());
 }
 
+void strain_along(LocalEnergyModel &of, const Array1<double> &axes)
+{
+  require(axes.shape(0) == static_cast<std::size_t>(of.dimension()),
+          "axes do not have one number per dimension.");
+  require_finite(axes, "axes");
+  of.strain_along({axes.data(), axes.data() + axes.size()});
+}
+
 nb::object poses_of(const LocalEnergyModel &about)
 {
   const std::size_t D = about.dimension(), N = about.n_particles();
@@ -214,6 +222,26 @@ void export_constructors()
   });
 }
 
+void export_strains()
+{
+  using namespace nb::literals;
+  nb::borrow<nb::class_<LocalEnergyModel>>(nb::type<LocalEnergyModel>())
+      .def("strain_along", &strain_along, "axes"_a,
+           "From now on coupling and strain_curvature are about the strain of these axes (D,),\n"
+           "0 or 1 each; at first of all axes.")
+      .def_prop_ro(
+          "coupling",
+          [](const LocalEnergyModel &of) {
+            const Eigen::VectorXd &found = of.coupling();
+            return array_of(found.data(), found.size());
+          },
+          "Derivative (n,) of the gradient with respect to the strain, where a Hessian was last "
+          "made;\n"
+          "empty before.")
+      .def_prop_ro("strain_curvature", &LocalEnergyModel::strain_curvature,
+                   "Second derivative of the energy with respect to the strain, there.");
+}
+
 }  // namespace
 
 void export_local_energy_model(nb::module_ &m)
@@ -248,9 +276,9 @@ void export_local_energy_model(nb::module_ &m)
            "space, and factors solve equations, by iteration where they are incomplete.")
       .def("evaluate", &evaluate, "x"_a, "strain"_a, "extended"_a,
            "Return energy, gradient (n,), derivative with respect to the strain, sum of the\n"
-           "magnitudes of bond forces, number of bonds, and the index of a pair that crosses and "
-           "of\n"
-           "one that is unconverged, or -1; None if the pairs no longer hold.")
+           "magnitudes of bond forces, number of bonds, the index of a pair that crosses and of\n"
+           "one that is unconverged, or -1, and the virial (D D,); None if the pairs no longer "
+           "hold.")
       .def("factorise", &factorise, "x"_a, "strain"_a, "diagonal"_a,
            "Factors of the Hessian in these coordinates plus a diagonal (n,), shifted if it is\n"
            "not positive definite.")
@@ -267,6 +295,7 @@ void export_local_energy_model(nb::module_ &m)
           "Take all pairs of surfaces closer than a wide skin at these poses, and of centres\n"
           "closer than reach; those within skin are chosen among them as particles move.");
 
+  export_strains();
   export_constructors();
 }
 

@@ -23,7 +23,7 @@ inline nb::object tuple_of(const LandscapeSums &sums)
 {
   return nb::make_tuple(sums.energy, array_of(sums.gradient.data(), sums.gradient.size()),
                         sums.strain_gradient, sums.bond_force, sums.n_bonds, sums.crossing,
-                        sums.unconverged);
+                        sums.unconverged, array_of(sums.virial.data(), sums.virial.size()));
 }
 
 /// Callback that gives a local energy model new pairs: a Python function of x and the strain.

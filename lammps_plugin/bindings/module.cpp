@@ -1,6 +1,7 @@
 #include "contact/instruction_set.hpp"
 
 #include "bindings/arrays.hpp"
+#include "packing/box_times.hpp"
 
 namespace jamshape {
 namespace {
@@ -12,6 +13,13 @@ nb::list instruction_sets()
     if (machine_has(known.set)) names.append(known.name);
   }
   return names;
+}
+
+/// The default time of a box that yields, and the viscosity of the host.
+nb::tuple box_times(double drag, double measure, double stiffness, int dimension)
+{
+  const double viscosity = host_viscosity(drag, measure, dimension);
+  return nb::make_tuple(default_box_time(viscosity, measure, stiffness), viscosity);
 }
 
 }  // namespace
@@ -43,6 +51,9 @@ NB_MODULE(_contact, m)
   jamshape::export_rattlers(m);
   jamshape::export_sparse_product(m);
   jamshape::export_probes(m);
+  m.def("box_times", &jamshape::box_times,
+        "Default time in which a box yields, and the viscosity of the host, from the drag k_d, the\n"
+        "mean measure of the particles, k_e and the dimension.");
   m.def("instruction_sets", &jamshape::instruction_sets,
         "Instruction sets of this machine that contacts in packs are compiled for, as the\n"
         "environment variable JAMSHAPE_SIMD names them, best last; with 'scalar' pairs go one by\n"

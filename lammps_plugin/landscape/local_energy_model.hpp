@@ -77,6 +77,7 @@ struct LandscapeSums {
   double strain_gradient, bond_force;
   std::size_t n_bonds;
   std::int64_t crossing, unconverged;
+  std::vector<double> virial;  // (D, D) sum of r (x) force, with the trace -strain_gradient
 
   bool is_refused() const { return crossing >= 0 || unconverged >= 0; }
 };
@@ -120,6 +121,10 @@ class LocalEnergyModel {
   /// incomplete: for stages of a flow.
   virtual void follow_bodies() = 0;
 
+  /// From now on `coupling` and `strain_curvature` are about the strain of these axes (D,), 0 or 1
+  /// each, at fixed rotations; at first about that of all axes.
+  virtual void strain_along(const std::vector<double> &axes) = 0;
+
   /// Sets the number of threads of sums over contacts, if there are enough: the last bits depend on
   /// this number, but on nothing else.
   virtual void share(std::size_t threads) = 0;
@@ -137,6 +142,8 @@ class LocalEnergyModel {
   virtual void differentiate(const Displacement &at) = 0;
   /// (n,) derivative of the gradient with respect to the strain, at that point.
   virtual const Eigen::VectorXd &coupling() const = 0;
+  /// Second derivative of the energy with respect to the strain, at that point.
+  virtual double strain_curvature() const = 0;
   /// (n,) diagonal of the Hessian at that point.
   virtual Eigen::VectorXd diagonal() const = 0;
   /// Product of that Hessian and a vector (n,).
@@ -249,6 +256,11 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     hessian = nullptr;
   }
 
+  void strain_along(const std::vector<double> &axes_of_strain) override
+  {
+    std::copy_n(axes_of_strain.begin(), D, strained.c);
+  }
+
   void share(std::size_t threads) override
   {
     team = threads > 1 ? std::make_unique<Team>(threads) : nullptr;
@@ -293,6 +305,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     const TurnedBodies<Model, D, double> turned_bodies(posed);
     hessian->clear();
     pulled = Eigen::VectorXd::Zero(n());
+    pulled_back = 0.0;
     find_axes(at);
     Team *const by = team_for(posed.size());
     curved.resize(parts_of(by));
@@ -312,6 +325,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   }
 
   const Eigen::VectorXd &coupling() const override { return pulled; }
+  double strain_curvature() const override { return pulled_back; }
   Eigen::VectorXd diagonal() const override { return hessian->diagonal(); }
 
   Eigen::VectorXd largest_of_kind() const override
@@ -385,7 +399,9 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   Poses base;
   mutable Poses there;                   // at the last point
   std::unique_ptr<BlockSystem> hessian;  // none before pairs are known
-  Eigen::VectorXd pulled;
+  Vec<D> strained = all_axes();
+  Eigen::VectorXd pulled;  // by the strain of these axes
+  double pulled_back = 0.0;
   std::unique_ptr<Team> team;
   std::vector<std::vector<Curved>> curved;  // for each thread, empty between uses
 
@@ -405,7 +421,22 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
             static_cast<double>(sums.bond_force),
             sums.n_bonds,
             of_wide(sums.crossing),
-            of_wide(sums.unconverged)};
+            of_wide(sums.unconverged),
+            doubles_of(sums.virial)};
+  }
+
+  template <class S> static std::vector<double> doubles_of(const Vec<D * D, S> &virial)
+  {
+    std::vector<double> found(D * D);
+    for (int k = 0; k < D * D; ++k) found[k] = static_cast<double>(virial[k]);
+    return found;
+  }
+
+  static Vec<D> all_axes()
+  {
+    Vec<D> found;
+    for (double &each : found.c) each = 1.0;
+    return found;
   }
 
   template <class S> StartIn<Model, D, S> *begins() const
@@ -804,11 +835,16 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
       }
     }
     // The affine strain displaces i relative to j in proportion to r.
+    Vec<D> apart;
+    for (int d = 0; d < D; ++d) apart[d] = strained[d] * r[d];
+    for (int a = 0; a < D; ++a) {
+      for (int b = 0; b < D; ++b) pulled_back += apart[a] * by(a, b) * apart[b];
+    }
     Eigen::Matrix<double, BLOCK, 1> pull[2];
     for (int side = 0; side < 2; ++side) {
       for (int k = 0; k < BLOCK; ++k) {
         double along = 0.0;
-        for (int d = 0; d < D; ++d) along += by(variable(side, k), d) * r[d];
+        for (int d = 0; d < D; ++d) along += by(variable(side, k), d) * apart[d];
         pull[side][k] = scale[side][k] * along;
       }
       if (axes.empty()) continue;

@@ -1,5 +1,7 @@
 #include "box_control.h"
 
+#include "packing/box_times.hpp"
+
 #include "atom.h"
 #include "comm.h"
 #include "compat.h"
@@ -170,16 +172,14 @@ void BoxControl::begin_run(PairContact &of)
   }
   MPI_Allreduce(&mine, &measure, 1, MPI_DOUBLE, MPI_SUM, world);
   if (is_time_given) return;
-  // Single precision, so that it does not depend on the order of atoms.
   const double mean = measure / static_cast<double>(atom->natoms);
-  t_box = static_cast<float>(host_viscosity() * mean / stiffness);
+  t_box = default_box_time(host_viscosity(), mean, stiffness);
 }
 
 double BoxControl::host_viscosity() const
 {
   const double mean = measure / static_cast<double>(atom->natoms);
-  const double d = dimension == 2 ? std::sqrt(4.0 * mean / M_PI) : std::cbrt(6.0 * mean / M_PI);
-  return static_cast<float>(drag * d * d);
+  return static_cast<float>(jamshape::host_viscosity(drag, mean, dimension));
 }
 
 void BoxControl::aim(Target &at, bool is_normal) const

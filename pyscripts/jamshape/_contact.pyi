@@ -17,7 +17,7 @@ _Reals: TypeAlias = NDArray[np.float64]
 _Ints: TypeAlias = NDArray[np.int64]
 _Bools: TypeAlias = NDArray[np.bool_]
 _Arrays: TypeAlias = dict[str, NDArray[Any]]
-_Sums: TypeAlias = tuple[float, _Reals, float, float, int, int, int]
+_Sums: TypeAlias = tuple[float, _Reals, float, float, int, int, int, _Reals]
 _Renew: TypeAlias = Callable[[_Reals, float], None]
 
 class _Shape:
@@ -115,6 +115,9 @@ class _Shape:
 def find_rattlers(
     n_particles: int, dimension: int, pairs: _Ints, normals: _Reals, flat: _Bools
 ) -> _Bools: ...
+def box_times(
+    drag: float, measure: float, stiffness: float, dimension: int
+) -> tuple[float, float]: ...
 def instruction_sets() -> list[str]: ...
 def sparse_product(
     first: _Ints, column: _Ints, value: _Reals, dense: _Reals, is_long: bool
@@ -203,6 +206,9 @@ class NewtonSystem:
 
 class LocalEnergyModel:
     poses: tuple[_Reals, _Reals, _Reals]
+    coupling: _Reals
+    strain_curvature: float
+    def strain_along(self, axes: _Reals) -> None: ...
     def move_to(self, position: _Reals, orientation: _Reals, cell: _Reals) -> None: ...
     def move(self, x: _Reals, strain: float) -> tuple[_Reals, _Reals, _Reals]: ...
     def hold(self) -> None: ...

@@ -241,6 +241,12 @@ def of_vicinity(fuzz, of, dimension, poses, pairs):
         "deform": deform,
         "poses": lambda: fuzz.call("poses", lambda: about.poses),
         "share": lambda: fuzz.call("share", about.share, threads=2),
+        "strain_along": lambda: fuzz.call(
+            "strain_along", about.strain_along, axes=np.ones(dimension)
+        ),
+        "strain derivatives": lambda: fuzz.call(
+            "coupling", lambda: (about.coupling, about.strain_curvature)
+        ),
         "evaluate": lambda: fuzz.call(
             "evaluate", about.evaluate, x=np.zeros(n), strain=0.0, extended=False
         ),

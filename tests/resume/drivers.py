@@ -228,6 +228,17 @@ CASES = DRIVERS | {
         "cyclic_shear", "rods",  # its box takes other cell vectors, to and fro
         {"amplitude": 0.6, "period": 240.0, "cycles": 2, "rows": 12, "pressure": 1e-2},
     ),
+    "implicit shear at a pressure": Case(
+        "shear", "discs",
+        {"gdot": 1e-3, "strain": 0.12, "pressure": 1e-2, "t_box": 20.0, "integrator": "tr-bdf2",
+         "integration_tolerance": 1e-2, "rows": 20},
+        {"pressure": 2e-2, "t_box": 30.0},
+    ),
+    "implicit shear in space at a pressure": Case(
+        "shear", "bodies",
+        {"gdot": 1e-3, "strain": 0.06, "pressure": 1e-2, "t_box": 20.0, "integrator": "sdirk2",
+         "integration_tolerance": 1e-2, "rows": 20},
+    ),
     "pure shear in LAMMPS": Case(
         "shear", "dimers", {"gdot": 1e-2, "strain": 0.5, "flow": "pure", "dt": 0.1, **_ROWS}
     ),

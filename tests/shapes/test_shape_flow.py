@@ -8,6 +8,7 @@ from every_shape import EPS, MIXTURES, SIDES, TYPICAL, close_to, pressed, scatte
 from lammps_runs import fix_vector, loaded, state_of
 from slopes import slope_at_0
 
+import jamshape as js
 from jamshape.contacts import find_contacts
 from jamshape.flow import implicit
 from jamshape.flow.compression import Compression, CompressionRun
@@ -146,6 +147,24 @@ def test_all_integrators_agree_on_the_pressure(case, measured):
     for name, (p, error) in found.items():
         assert error < 0.01 * best, name
         assert abs(p - best) <= 2 * (error + least), name
+
+
+@EVERY
+def test_a_box_yields_to_a_normal_pressure_by_explicit_and_implicit_steps(case, tmp_path, measured):
+    start = squeezed(case, overlap=0.02)
+    held = 0.8 * float(Landscape(start, sides=SIDES).stress(State.of(start))[1, 1])
+    asked = {"start": start, "gdot": 1e-3, "strain": 1e-3, "pressure": held, "t_box": 2.0, "rows": 2, "progress": False}  # fmt: skip
+    explicit, implicit_ = (
+        js.shear(integrator=name, integration_tolerance=error, file=tmp_path / f"{name}.h5", **asked)
+        for name, error in (("rkc2", 1e-6), ("tr-bdf2", 1e-4))
+    )  # fmt: skip
+    assert abs(explicit["phi"][-1] / start.phi - 1) > 1e-4
+    off = {
+        name: abs(implicit_[name][-1] / explicit[name][-1] - 1) for name in ("phi", "p_yy", "p_xy")
+    }
+    measured(**off)
+    assert off["phi"] < 1e-5
+    assert off["p_yy"] < 1e-3
 
 
 # --- power ---------------------------------------------------------------------------------------

@@ -15,6 +15,17 @@ from jamshape.arrays import FloatArray, LongArray
 from jamshape.packing import rate_of_vector, turned
 
 
+def exponential(matrix: LongArray) -> LongArray:
+    """(D, D) exponential of an upper triangular matrix (D, D), in space without entries above the diagonal in its last column."""
+    rates = np.diagonal(matrix)
+    found: LongArray = np.diag(np.exp(rates))
+    mean, half = (rates[0] + rates[1]) / 2, (rates[0] - rates[1]) / 2
+    # (exp(a) - exp(d)) / (a - d), with limit exp(a).
+    slope = np.exp(mean) * (np.sinh(half) / half if half else np.longdouble(1))
+    found[0, 1] = matrix[0, 1] * slope
+    return found
+
+
 @dataclass(frozen=True, eq=False)
 class Host:
     """A host in the plane or in space.
@@ -46,13 +57,7 @@ class Host:
 
     def deformation(self, time: float) -> LongArray:
         """(D, D) exp(G t)."""
-        rates = np.diagonal(self.gradient).astype(np.longdouble) * time
-        found: LongArray = np.diag(np.exp(rates))
-        mean, half = (rates[0] + rates[1]) / 2, (rates[0] - rates[1]) / 2
-        # (exp(a) - exp(d)) / (a - d), with limit exp(a).
-        slope = np.exp(mean) * (np.sinh(half) / half if half else np.longdouble(1))
-        found[0, 1] = np.longdouble(self.gradient[0, 1]) * time * slope
-        return found
+        return exponential(self.gradient.astype(np.longdouble) * time)
 
     @property
     def turns_particles(self) -> bool:

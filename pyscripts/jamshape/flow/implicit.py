@@ -14,17 +14,24 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 from typing import Protocol as Proto
 
 import numpy as np
 
 from jamshape.arrays import FloatArray, IntArray, LongArray
 from jamshape.checks import require_one_of, require_positive
-from jamshape.flow.host import Host
+from jamshape.flow.box_control import Border, BoxControl, Secant, YieldingBox
+from jamshape.flow.host import Host, exponential
 from jamshape.flow.turning import turning_of
 from jamshape.landscape import CrossingError, Evaluation, Landscape, State
-from jamshape.landscape.local_energy_model import LocalEnergyModel, Stage, StageFactors, Units
+from jamshape.landscape.local_energy_model import (
+    LocalEnergyModel,
+    Solution,
+    Stage,
+    StageFactors,
+    Units,
+)
 
 # Accuracy of stages, over the allowed local error. A tenfold one would leave velocities on kinks
 # that cause rejections: packings of nearly round rods then cost ten times as much.
@@ -51,6 +58,10 @@ _LARGEST_TILT = 0.6
 _EXPLICIT_BELOW = 0.5  # longest explicit step, in drag over stiffness
 _EXPLICIT_IN_A_ROW = 20
 _LEAST_STEP = 1e-3  # shortest explicit step, over the longest
+
+# Most solutions of a stage in a box that yields, largest strain in a step by its rate at the start, and at the end.
+_BOXES = 12
+_YIELDED, _OVERSTRAINED = 1e-3, 4e-3
 
 # Spines that cross within this fraction of the times of contacts and of the box cross at any step.
 _AT_ONCE = 1e-9
@@ -133,6 +144,8 @@ class Protocol:
     largest_drop: float = math.inf
     method: str = "tr-bdf2"
 
+    control: ClassVar[BoxControl | None] = None
+
     def __post_init__(self) -> None:
         names = ("phi_end", "tolerance", "k_d", "largest_strain")
         # Infinite values are not bounds.
@@ -202,8 +215,8 @@ class Flow:
     dt : float, [time]
         Next step; 0 to choose one.
     velocity : (n,) array, [length / time]
-        Nonaffine velocity at the end of the last step, in the coordinates of the landscape;
-        empty to compute it.
+        Nonaffine velocity at the end of the last step, in the coordinates of the landscape, and that of
+        a box that yields; empty to compute it.
     acceleration : (n,) array, [length / time^2]
         Its change over the last step; both are only predictors, unless the method has an explicit stage.
     """
@@ -230,6 +243,8 @@ class Flow:
     """Whether velocities are extrapolated, as the acceleration predicted the last one."""
     _factors: StageFactors | None = field(default=None, repr=False)
     _dt_of_factors: float = 0.0
+    _border: Border | None = field(default=None, repr=False)
+    """Border of these factors, of a box that yields."""
     _here: Evaluation | None = field(default=None, repr=False)
     """Evaluation at the end of the last step, before the last correction of its last stage."""
     _is_fresh: bool = True
@@ -237,6 +252,7 @@ class Flow:
     def forget(self) -> None:
         """Drop cached data, so that the continuation depends only on the public fields."""
         self._factors, self._here, self._is_fresh = None, None, True
+        self._border = None
 
 
 class Step(NamedTuple):
@@ -320,6 +336,10 @@ class Course(Proto):
     def method(self) -> str:
         """One of `METHODS`."""
 
+    @property
+    def control(self) -> BoxControl | None:
+        """Normal stress to which the box yields, if any."""
+
     def leg(self, flow: Flow, phi: float) -> Leg:
         """Return the host, and for how long it applies."""
 
@@ -364,9 +384,21 @@ class _Attempt(NamedTuple):
     """Result of a trial step."""
 
     x: FloatArray
+    """(n,) displacements due to forces, without the coordinate of the box."""
     path: _Path
     error: float
     evaluation: Evaluation
+
+
+class _Accuracy(NamedTuple):
+    """Accuracy of stages."""
+
+    units: Units
+    tolerance: float
+    """Largest correction, in these units."""
+    overlap: float
+    """Typical overlap, over the size."""
+    extended: bool
 
 
 class ImplicitFlow:
@@ -375,8 +407,12 @@ class ImplicitFlow:
     def __init__(self, landscape: Landscape, flow: Flow, protocol: Course) -> None:
         self.landscape, self.flow, self.protocol = landscape, flow, protocol
         self.local_model = LocalEnergyModel(landscape, flow.state, along_bodies=True)
+        self.box = YieldingBox(protocol.control, landscape, protocol.k_d) if protocol.control else None
         self.still = np.zeros(landscape.size)
         self.drag = drag_coefficients(landscape, protocol.k_d)
+        if self.box:
+            self.local_model.strain_along(self.box.axes)
+            self.still, self.drag = np.append(self.still, 0.0), np.append(self.drag, self.box.drag)
         self._least_drag = _least_drag(landscape, protocol.k_d)
         self.measure = float(landscape.particles.measures.sum())
         self.size = 2 * float(landscape.inner_radius.mean())
@@ -399,6 +435,8 @@ class ImplicitFlow:
         flow.wall_seconds += time.perf_counter() - began
         flow.evaluations += landscape.evaluations - evaluations
         flow.steps += 1
+        if self.box:
+            self.box.require_bearing(self.phi)
         volume = flow.state.volume
         pressure = -found.strain_gradient / (self.dimension * volume)
         return Step(
@@ -418,7 +456,7 @@ class ImplicitFlow:
         self.orientation = flow.state.orientation.astype(np.float64)
         self.host, longest = self.protocol.leg(flow, self.phi)
         # Stage accuracy suffices for units and energies.
-        here = flow._here or self._evaluated()
+        here = flow._here or self._present()
         if not flow.velocity.size:
             self._begin(here)
         while True:
@@ -437,7 +475,7 @@ class ImplicitFlow:
     def _next_trial(self, longest: float) -> _Trial:
         """Choose the step to try, within the period of the host."""
         flow = self.flow
-        dt = min(flow.dt, self.protocol.largest_strain / self.host.rate)
+        dt = min(flow.dt, self._time_of_strain(1.0))
         clipped = dt >= 0.999 * longest
         dt = longest if clipped else dt
         explicit = flow.explicit_left > 0 or dt < self._stable
@@ -496,21 +534,34 @@ class ImplicitFlow:
         at_rest = np.stack([np.eye(self.dimension), np.zeros((self.dimension, self.dimension))])
         n_turns = 1 if self.dimension == 2 else 3
         self.local_model.deform(at_rest, np.zeros((self.landscape.particles.n, n_turns)))
-        return self.local_model.evaluate(self.still, 0.0, extended=False)
+        return self.local_model.evaluate(np.zeros(self.landscape.size), 0.0, extended=False)
 
     def _refuse_crossing(self, dt: float) -> None:
-        if self._crossing is None or dt > _AT_ONCE * min(self._stable, 1 / self.host.rate):
+        if self._crossing is None or dt > _AT_ONCE * min(self._stable, 1 / self._rate):
             return
-        spines = str(self._crossing).partition(",")[0]
+        raise self._crossed(self._crossing)
+
+    def _present(self) -> Evaluation:
+        """Evaluate the present state; refuse spines that the last correction crossed."""
+        try:
+            return self._evaluated()
+        except CrossingError as error:
+            if self.flow.steps == 0:
+                raise
+            raise self._crossed(error) from None
+
+    def _crossed(self, error: CrossingError) -> CrossingError:
+        spines = str(error).partition(",")[0]
+        pushes, less = (" and a pressure", ", use a smaller pressure") if self.box else ("", "")
         msg = (
-            f"{spines} {self.protocol.where(self.phi)}, expected a rate that their contacts withstand; flow"
-            " more slowly, or end earlier"
+            f"{spines} {self.protocol.where(self.phi)}, expected a rate{pushes} that their contacts withstand; flow"
+            f" more slowly{less}, or end earlier"
         )
-        raise CrossingError(msg)
+        return CrossingError(msg)
 
     def _falls_too_far(self, now: Evaluation, before: Evaluation) -> bool:
         # Contacts no stronger than the drag of the box motion open and close without an event.
-        push = self.host.rate * self._least_drag * float(self.flow.state.edges.max())
+        push = self._rate * self._least_drag * float(self.flow.state.edges.max())
         least = self.landscape.particles.n * (push * self.size) ** 2 / self.landscape.stiffness
         return before.energy - now.energy > self.protocol.largest_drop * max(before.energy, least)
 
@@ -521,26 +572,56 @@ class ImplicitFlow:
     @property
     def _stable(self) -> float:
         """Estimate the longest explicit step, [time]: drag over stiffness of a contact or two."""
-        return _EXPLICIT_BELOW * self._least_drag * self.size**2 / self.landscape.stiffness
+        longest = self._least_drag * self.size**2 / self.landscape.stiffness
+        return _EXPLICIT_BELOW * (min(longest, self.box.longest_explicit) if self.box else longest)
+
+    @property
+    def _rate(self) -> float:
+        """Largest of the rates of the host, [1/time]; also that at which the box yields."""
+        return max(self.host.rate, self._yield_rate) if self.box else self.host.rate
+
+    @property
+    def _yield_rate(self) -> float:
+        """Rate at which a box yields, [1/time], not zero."""
+        assert self.box is not None
+        return max(abs(float(self.flow.velocity[-1])) / self.box.length, 1e-300)
+
+    def _time_of_strain(self, part: float) -> float:
+        """Return the time of a part of the largest strain of a step."""
+        rate, most = self.host.rate, part * self.protocol.largest_strain
+        if self.box is None:
+            return most / rate
+        return min(most / rate if rate else math.inf, part * _YIELDED / self._yield_rate)
+
+    def _slope(self, evaluation: Evaluation, growth: float = 1.0) -> FloatArray:
+        """Return the derivatives of energy or enthalpy, with the growth of the volume since the start of the step."""
+        if self.box is None:
+            return evaluation.gradient
+        of_box = self.box.slope(evaluation, growth * self.flow.state.volume)
+        return np.append(evaluation.gradient, of_box)
+
+    def _with_box(self, of_particles: FloatArray, of_box: FloatArray | float = 0.0) -> FloatArray:
+        """Append the component of a box that yields to (n,) components."""
+        return of_particles if self.box is None else np.append(of_particles, of_box)
 
     def _begin(self, here: Evaluation) -> None:
         flow = self.flow
-        flow.velocity = -here.gradient / self.drag
+        flow.velocity = -self._slope(here) / self.drag
         flow.acceleration = np.zeros_like(flow.velocity)
         if flow.dt == 0.0:
             speed = self._rms(flow.velocity)
             flow.dt = min(
                 0.1 * self.protocol.tolerance**0.5 * self._unit(here) / max(speed, 1e-300),
-                0.01 * self.protocol.largest_strain / self.host.rate,
+                self._time_of_strain(0.01),
             )
 
     def _unit(self, evaluation: Evaluation) -> float:
         """Typical overlap, at least that caused by drag on a particle a diameter from the centre."""
-        least = self.host.rate * self._least_drag * self.size
+        least = self._rate * self._least_drag * self.size
         return max(evaluation.bond_force, least) * self.size**2 / self.landscape.stiffness
 
     def _rms(self, vector: FloatArray) -> float:
-        """Root mean square over particles of an (n,) vector of coordinates."""
+        """Root mean square over particles of a vector of coordinates."""
         return float(np.linalg.norm(vector)) / math.sqrt(self.landscape.particles.n)
 
     def _units(self, evaluation: Evaluation) -> Units:
@@ -571,61 +652,128 @@ class ImplicitFlow:
         if not 1 / _SAME_STEP < dt / max(flow._dt_of_factors, 1e-300) < _SAME_STEP:
             flow._factors = None
         path = _Path(self, [dt * part for part in method.times])
+        how = _Accuracy(units, accuracy, unit / self.size, self._is_extended(unit))
         evaluation, last = here, self.still
         for k, row in enumerate(method.weights):
-            own = row[k] * dt
-            centre = path.combined(row, dt)
-            if own == 0.0:
+            if row[k] == 0.0:
                 path.add(flow.velocity)
                 continue
-            drag = self.drag / own
-            predicted = self._predicted(path)
-            guess = centre + own * predicted
+            solved = self._solved(path, [dt * weight for weight in row], last, how)
+            if solved is None:
+                return None
+            evaluation, last, velocity = solved
+            path.add(velocity)
+        flow._dt_of_factors = dt
+        drag = self.drag / (dt * row[-1])
+        force = drag * path.combined([dt * weight for weight in method.error])
+        size = self._units(evaluation).size(self._response(force, drag), force, drag)
+        return _Attempt(last[: self.landscape.size], path, size, evaluation)
+
+    def _solved(
+        self, path: _Path, times: list[float], last: FloatArray, how: _Accuracy
+    ) -> tuple[Evaluation, FloatArray, FloatArray] | None:
+        """Solve a stage; return the evaluation, the coordinates there and their velocity.
+
+        The coordinate of a box that yields is found by a secant method. The solution at each of its values costs an
+        evaluation or two, with the same factors.
+        """
+        own, n = times[len(path.velocities)], self.landscape.size
+        drag = self.drag / own
+        if self.box:  # whose guess does not depend on the transport of others
+            guessed = (path.combined(times) + own * self._predicted(path))[-1]
+            # Its last rate says nothing about times beyond its relaxation: there the box begins as it was.
+            if not self.box.is_beyond(guessed - path.strained, how.overlap):
+                path.strain_to(guessed)
+        centre, velocity = path.combined(times), self._predicted(path)
+        guess, secant = centre + own * velocity, Secant()
+        guess[n:] = path.strained
+        for _ in range(_BOXES if self.box else 1):
             path.go_to_stage()
-            pushed = centre + own * path.turning.excess(guess, predicted)
-            stage = Stage(drag, pushed, (guess, last), self._is_extended(unit))
-            found = self.local_model.solve(stage, flow._factors, units, accuracy)
-            flow.factorisations += found.factorisations
-            flow._factors, flow._dt_of_factors = found.factors, dt
+            pushed = centre[:n] + own * path.turning.excess(guess[:n], velocity[:n])
+            found = self._in_box(
+                Stage(drag[:n], pushed, (guess[:n], last[:n]), how.extended), how, path
+            )
             if not found.solved:
                 return None
-            evaluation, last = found.evaluation, found.x
-            path.add((found.x - centre) / own)
-        error = path.combined(method.error, dt)
-        force = drag * error
-        assert found.factors is not None
-        size = self._units(evaluation).size(found.factors.factors.solve(force), force, drag)
-        return _Attempt(found.x, path, size, evaluation)
+            x = self._with_box(found.x, path.strained)
+            velocity = (x - centre) / own
+            if self.box is None:
+                return found.evaluation, x, velocity
+            slope = self.box.slope(found.evaluation, path.growth * self.flow.state.volume)
+            force = np.append(np.zeros(n), -drag[-1] * (x - centre)[-1] - slope)
+            assert self.flow._border is not None
+            stiffness = secant.stiffness((x[-1], force[-1]), drag[-1], self.flow._border)
+            correction = self.flow._border.solve(np.zeros(n), force, stiffness)
+            guess = x + correction
+            if self.box.is_beyond(guess[-1], _OVERSTRAINED):
+                return None
+            path.strain_to(guess[-1])
+            centre = path.combined(times)
+            velocity = (guess - centre) / own
+            if how.units.size(correction, force, drag) <= how.tolerance:
+                return found.evaluation, guess, velocity
+        return None
+
+    def _response(self, force: FloatArray, drag: FloatArray) -> FloatArray:
+        """Return the displacement of particles and box by a force, from the factors of the last stage."""
+        factors, border = self.flow._factors, self.flow._border
+        assert factors is not None
+        inner = factors.factors.solve(force[: self.landscape.size])
+        if self.box is None:
+            return inner
+        assert border is not None
+        return border.solve(inner, force, drag[-1] + max(border.stiffness, 0.0))
+
+    def _in_box(self, stage: Stage, how: _Accuracy, path: _Path) -> Solution:
+        """Solve a stage in the box of a path; keep its factors."""
+        flow = self.flow
+        found = self.local_model.solve(stage, flow._factors, how.units, how.tolerance)
+        flow.factorisations += found.factorisations
+        flow._factors = found.factors
+        if self.box and found.factorisations and found.factors:
+            volume = path.growth * flow.state.volume
+            flow._border = self.box.border(
+                found.factors.factors,
+                self.local_model.strain_derivatives,
+                (found.evaluation, volume),
+            )
+        return found
 
     def _predicted(self, path: _Path) -> FloatArray:
         """Extrapolate the velocity to the next stage, or keep it."""
         flow, known = self.flow, len(path.velocities)
-        last = path.velocity(known - 1) if known else path.carried(flow.velocity, 0.0)
+        last = path.velocity(known - 1) if known else path.carried(flow.velocity)
         if not flow.extrapolates:
             return last
         if known and path.times[known - 1] > 0:
             before = path.times[known - 1]
-            slope = (last - path.carried(flow.velocity, 0.0)) / before
+            slope = (last - path.carried(flow.velocity)) / before
             return last + (path.next_time - before) * slope
-        return path.carried(flow.velocity + path.next_time * flow.acceleration, 0.0)
+        return path.carried(flow.velocity + path.next_time * flow.acceleration)
 
     def _explicit(self, dt: float, here: Evaluation) -> _Attempt:
         extended = self._is_extended(self._unit(here))
         path = _Path(self, [dt * part for part in _HEUN_EULER.times])
-        path.add(-here.gradient / self.drag)
-        evaluation = here
+        path.add(-self._slope(here) / self.drag)
+        evaluation, n = here, self.landscape.size
         for row in _HEUN_EULER.weights[1:]:
-            x = path.combined(row, dt)
+            times = [dt * weight for weight in row]
+            x = path.combined(times)
+            if self.box:  # whose coordinate does not depend on the transport of others
+                path.strain_to(x[-1])
+                x = path.combined(times)
             path.go_to_stage()
-            evaluation = self.local_model.evaluate(x, 0.0, extended=extended)
-            velocity = -evaluation.gradient / self.drag
-            path.add(velocity + path.turning.excess(x, velocity))
+            evaluation = self.local_model.evaluate(x[:n], 0.0, extended=extended)
+            velocity = -self._slope(evaluation, path.growth) / self.drag
+            path.add(velocity + self._with_box(path.turning.excess(x[:n], velocity[:n])))
         error = 0.5 * dt * (path.velocity(1) - path.velocity(0))
-        return _Attempt(x, path, self._rms(error) / self._unit(evaluation), evaluation)
+        return _Attempt(x[:n], path, self._rms(error) / self._unit(evaluation), evaluation)
 
     def _accept(self, attempt: _Attempt, dt: float) -> None:
         flow, path = self.flow, attempt.path
-        begun, acceleration = (path.carried(v, 0.0) for v in (flow.velocity, flow.acceleration))
+        begun, acceleration = (path.carried(v) for v in (flow.velocity, flow.acceleration))
+        if self.box:  # as the last correction left it
+            path.go_to_stage()
         self.local_model.move(attempt.x, 0.0)
         flow.state, flow._here = self.local_model.base, attempt.evaluation
         # Velocities jump when contacts open or close: extrapolation is then less accurate.
@@ -633,7 +781,8 @@ class ImplicitFlow:
         missed = np.linalg.norm(jump - dt * acceleration)
         flow.extrapolates = int(missed < _TOLD * np.linalg.norm(jump))
         flow.acceleration = jump / dt
-        flow.velocity = path.turning.settled(attempt.x, path.velocities[-1])
+        last, n = path.velocities[-1], self.landscape.size
+        flow.velocity = self._with_box(path.turning.settled(attempt.x, last[:n]), last[n:])
         flow.time += dt
         flow.turned += path.turning.mean(attempt.x)
         flow.strain += self.host.rate * dt
@@ -666,13 +815,33 @@ class _Path:
     def __init__(self, run: ImplicitFlow, times: list[float]) -> None:
         self.run, self.times = run, times
         self.velocities: list[FloatArray] = []
-        self.turning = turning_of(run.landscape, run.host, run.orientation)
-        self._deformations: dict[float, LongArray] = {}
+        self.turning = turning_of(run.landscape, run.orientation)
+        self._strains = [0.0] * len(times)
+        self._deformations: dict[tuple[float, float], LongArray] = {}
 
     @property
     def next_time(self) -> float:
         """Time of the next stage since the start of the step; of the last stage at the end."""
-        return self.times[min(len(self.velocities), len(self.times) - 1)]
+        return self.times[self._next]
+
+    @property
+    def strained(self) -> float:
+        """Coordinate of a box that yields at that stage."""
+        return self._strains[self._next]
+
+    @property
+    def growth(self) -> float:
+        """Volume at that stage over that at the start of the step."""
+        driven = math.exp(float(np.trace(self.run.host.gradient)) * self.next_time)
+        return driven * self.run.box.growth(self.strained) if self.run.box else driven
+
+    @property
+    def _next(self) -> int:
+        return min(len(self.velocities), len(self.times) - 1)
+
+    def strain_to(self, coordinate: float) -> None:
+        """Strain the box at the next stage, and at those after it."""
+        self._strains[self._next :] = [float(coordinate)] * (len(self.times) - self._next)
 
     def add(self, velocity: FloatArray) -> None:
         """Store the velocity of a stage."""
@@ -680,14 +849,14 @@ class _Path:
 
     def velocity(self, stage: int) -> FloatArray:
         """Return a velocity, transported to the next stage."""
-        return self.carried(self.velocities[stage], self.times[stage])
+        return self.carried(self.velocities[stage], self.times[stage], self._strains[stage])
 
-    def carried(self, vector: FloatArray, begun: float) -> FloatArray:
-        """Transport displacements or velocities from a time in the step to the next stage."""
-        after = self.next_time - begun
-        if after == 0.0:
+    def carried(self, vector: FloatArray, begun: float = 0.0, strained: float = 0.0) -> FloatArray:
+        """Transport displacements or velocities from a time in the step, and a box, to the next stage."""
+        after, further = self.next_time - begun, self.strained - strained
+        if after == further == 0.0:
             return vector
-        matrix, columns = self._deformation(after).astype(np.float64), self.run.columns
+        matrix, columns = self._deformation(after, further).astype(np.float64), self.run.columns
         found = vector.copy()
         for k, column in enumerate(columns):
             found[column] = matrix[k, k] * vector[column]
@@ -696,21 +865,33 @@ class _Path:
                     found[column] += matrix[k, m] * vector[columns[m]]
         return found
 
-    def _deformation(self, after: float) -> LongArray:
-        if after not in self._deformations:
-            self._deformations[after] = self.run.host.deformation(after)
-        return self._deformations[after]
+    def _deformation(self, after: float, strained: float) -> LongArray:
+        key = after, strained
+        if key not in self._deformations:
+            matrix = self.run.host.gradient.astype(np.longdouble) * after
+            if self.run.box:
+                matrix = matrix + self.run.box.strain(strained)
+            self._deformations[key] = exponential(matrix)
+        return self._deformations[key]
 
-    def combined(self, weights: tuple[float, ...], dt: float) -> FloatArray:
-        """Displacement at the next stage from the velocities so far."""
-        used = zip(range(len(self.velocities)), weights, strict=False)
-        parts = (dt * weight * self.velocity(k) for k, weight in used if weight)
+    def combined(self, times: list[float]) -> FloatArray:
+        """Displacement at the next stage by the velocities so far, each for a time."""
+        used = zip(range(len(self.velocities)), times, strict=False)
+        parts = (time * self.velocity(k) for k, time in used if time)
         return sum(parts, start=self.run.still)
 
     def go_to_stage(self) -> None:
         """Move box, positions and angles with the host to the next stage."""
         after = self.next_time
-        matrix = self._deformation(after)
+        matrix = self._deformation(after, self.strained)
         double = matrix.astype(np.float64)
         rest = (matrix - double).astype(np.float64)
-        self.run.local_model.deform(np.stack([double, rest]), self.turning.by_host(after))
+        turns = self.turning.by_host(self._mean_host(after), after)
+        self.run.local_model.deform(np.stack([double, rest]), turns)
+
+    def _mean_host(self, after: float) -> Host:
+        """Return the mean velocity gradient since the start of the step, which rotates particles to second order."""
+        if self.run.box is None:
+            return self.run.host
+        yielded = self.run.box.strain(self.strained).astype(np.float64)
+        return Host(self.run.host.gradient + yielded / after)

@@ -39,7 +39,8 @@ _COUNTS = ("dt", "time", "strain", "turned", "steps", "rejected", "explicit", "e
 _COST = ("steps", "rejected", "explicit", "evaluations", "factorisations", "wall_seconds")
 
 
-_ARGUMENTS = {"strain_end": "strain", "phi_sheared": "phi", "tolerance": "integration_tolerance"}
+_ARGUMENTS = {"strain_end": "strain", "phi_sheared": "phi", "tolerance": "integration_tolerance",
+              "hold_pressure": "pressure"}  # fmt: skip
 
 
 def plan(
@@ -123,8 +124,8 @@ class ImplicitDriver:
         return {"state": self._flow.state} | {name: getattr(self._flow, name) for name in _COUNTS}
 
     def results(self) -> dict[str, Any]:
-        """Return the law, and the cost so far."""
-        found = self._first.law._asdict()
+        """Return the law, times of a box that yields, and the cost so far."""
+        found = self._first.law._asdict() | (self._run.box.times if self._run.box else {})
         return found | {f"flow_{name}": getattr(self._flow, name) for name in _COST}
 
     def close(self) -> None:
@@ -146,14 +147,15 @@ def _where(step: Step) -> str:
 
 
 def _as_attributes(course: Protocol | SlowShear) -> dict[str, Any]:
-    found = dataclasses.asdict(course)
+    found = {name: value for name, value in dataclasses.asdict(course).items() if value is not None}
     return found | ({"kappa": np.array(course.kappa)} if isinstance(course, Protocol) else {})
 
 
 def course_of(stored: Mapping[str, Any]) -> Protocol | SlowShear:
     """Read the driving of a run from the attributes of its file."""
     kind = SlowShear if "gdot" in stored else Protocol
-    values = {field.name: stored[field.name] for field in dataclasses.fields(kind)}
+    names = {field.name for field in dataclasses.fields(kind)} & stored.keys()
+    values = {name: stored[name] for name in names}
     if kind is SlowShear:
         return SlowShear(**values)
     rates = np.asarray(values.pop("kappa"))

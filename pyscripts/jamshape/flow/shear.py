@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from jamshape.checks import MOST_STEPS, RANGES, require_in, require_one_of, require_positive
+from jamshape.flow.box_control import BoxControl
 from jamshape.flow.motion import FlowRun, Motion
 
 if TYPE_CHECKING:
@@ -78,16 +79,9 @@ class Shearing(Motion):
             raise ValueError(msg)
 
     def _take_pressure(self) -> None:
-        for name in ("hold_pressure", "t_box"):
-            if (value := getattr(self, name)) is not None:
-                require_positive(**{name: value})
-                object.__setattr__(self, name, float(value))
-        if self.hold_pressure is None and self.t_box is not None:
-            msg = f"t_box {self.t_box} without a pressure, expected both or no time"
-            raise ValueError(msg)
-        if self.hold_pressure is not None and self.flow != "simple":
-            msg = f"flow {self.flow} drives the height of the box, which a pressure needs, expected flow simple or no pressure"
-            raise ValueError(msg)
+        if held := BoxControl.of_shear(self.hold_pressure, self.t_box, self.flow):
+            object.__setattr__(self, "hold_pressure", held.pressure)
+            object.__setattr__(self, "t_box", held.t_box)
 
     @property
     @abstractmethod

@@ -29,18 +29,21 @@ class Turning:
 
     Parameters
     ----------
-    landscape, host
+    landscape
     begun : (N, 1) or (N, 4) array of float64
         Angles or quaternions at the start of the step.
     """
 
-    def __init__(self, landscape: Landscape, host: Host, begun: FloatArray) -> None:
-        self._landscape, self._host, self._begun = landscape, host, begun
+    _host: Host
+
+    def __init__(self, landscape: Landscape, begun: FloatArray) -> None:
+        self._landscape, self._begun = landscape, begun
         self._now = begun
         """Orientations of particles that follow the host alone."""
 
-    def by_host(self, after: float) -> FloatArray:
-        """Follow the host for a time since the start; return its (N, 1 or 3) rotations."""
+    def by_host(self, host: Host, after: float) -> FloatArray:
+        """Follow a host for a time since the start; return its (N, 1 or 3) rotations."""
+        self._host = host
         if not self._host.turns_particles:
             return np.zeros((len(self._begun), 1))
         turns = self._host.turns(self._landscape.bodies, self._begun, after)
@@ -77,8 +80,9 @@ class Turning:
 class TurningInSpace(Turning):
     """Rotations in space; without any if all particles are round."""
 
-    def by_host(self, after: float) -> FloatArray:
-        """Follow the host for a time since the start; return its (N, 3) rotations."""
+    def by_host(self, host: Host, after: float) -> FloatArray:
+        """Follow a host for a time since the start; return its (N, 3) rotations."""
+        self._host = host
         if not (self._host.turns_particles and self._can_turn):
             return np.zeros((len(self._begun), 3))
         turns = self._host.turns(self._landscape.bodies, self._begun, after)
@@ -131,7 +135,7 @@ class TurningInSpace(Turning):
         return found
 
 
-def turning_of(landscape: Landscape, host: Host, begun: FloatArray) -> Turning:
+def turning_of(landscape: Landscape, begun: FloatArray) -> Turning:
     """Return the rotations of a step in this dimension."""
     kind = Turning if landscape.particles.dimension == 2 else TurningInSpace
-    return kind(landscape, host, begun)
+    return kind(landscape, begun)

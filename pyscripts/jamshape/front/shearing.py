@@ -146,13 +146,13 @@ def shear(
     of = Start.of(particles, asked, start, usual_phi=0.8, sides=sides, phi_name=_PHI_NAME)
     at = place(file, "shear.h5")
     whole = dt is None and sides == 2
-    integrator = integrator or _usual(gdot, of.dimension, whole=whole, yields=pressure > 0)
-    held = _held(pressure, t_box, flow, integrator)
+    integrator = integrator or _usual(gdot, of.dimension, whole=whole)
+    held = _held(pressure, t_box, flow)
     if integrator in METHODS:
         require_no_effect("integrator", integrator, dt=dt, frames=frames)
-        longest = min(SlowShear.largest_strain, strain / rows)
+        most = min(SlowShear.largest_strain, strain / rows)
         error = integration_tolerance or _IMPLICIT_ERROR
-        slow = SlowShear(gdot, strain, flow, error, largest_strain=longest, method=integrator)
+        slow = SlowShear(gdot, strain, flow, error, largest_strain=most, method=integrator, **held)
         _require_two_bonds(sides)
         made_from = of.made_from | {"rows": rows, "dimension": of.dimension}
         plan = implicit_driver.plan(lambda: _flowing(of), slow, made_from)
@@ -275,7 +275,7 @@ def cyclic_shear(
     of = Start.of(particles, Asked(n, phi, seed, dimension), start, usual_phi=0.8, sides=sides, phi_name=_PHI_NAME)  # fmt: skip
     at = place(file, "cycles.h5")
     integrator = integrator or ("heun" if dt is not None or sides == 1 else "rkc2")
-    held = _held(pressure, t_box, flow, integrator)
+    held = _held(pressure, t_box, flow)
     longest = longest_step(amplitude, period)
     if integrator == "heun":
         require_no_effect("integrator", integrator, integration_tolerance=integration_tolerance)
@@ -427,21 +427,18 @@ def _in_rows(settings: Shear, rows: int, **given: float | None) -> Shear:
     return settings.in_steps(rows) if settings.chooses_steps else settings
 
 
-def _usual(gdot: float, dimension: int, *, whole: bool, yields: bool) -> str:
-    """Choose the default integrator; implicit steps are for a fixed volume."""
+def _usual(gdot: float, dimension: int, *, whole: bool) -> str:
+    """Choose the default integrator."""
     if not whole:
         return "heun"
-    return "tr-bdf2" if gdot <= _SLOW[dimension] and not yields else "rkc2"
+    return "tr-bdf2" if gdot <= _SLOW[dimension] else "rkc2"
 
 
-def _held(pressure: float, t_box: float | None, flow: str, integrator: str) -> dict[str, Any]:
+def _held(pressure: float, t_box: float | None, flow: str) -> dict[str, Any]:
     """Return the settings of a pressure to hold, none without one, and refuse what does not go with it."""
     if not pressure:
         require_no_effect("pressure", pressure, t_box=t_box)
         return {}
-    if integrator in METHODS:
-        said = "{integrator} holds the volume, expected rkc2, heun/adaptive or heun with a pressure"
-        raise ArgumentError(said, {"integrator": integrator})
     if flow != "simple":
         said = "{flow} shear drives the height of the box, expected simple shear with a pressure"
         raise ArgumentError(said, {"flow": flow})

@@ -36,6 +36,8 @@ class Evaluation(NamedTuple):
     bond_force: float
     """Mean magnitude of the force of a bond; 0 without bonds."""
     n_bonds: int
+    virial: FloatArray
+    """(D, D) sum of r_k f_l over contacts, [energy]; its trace is minus the strain gradient."""
 
 
 class Curvature(NamedTuple):
@@ -172,6 +174,7 @@ class Landscape:
             strain_gradient=-float(np.trace(found["virial"])),
             bond_force=found["bond_force"] / max(n_bonds, 1),
             n_bonds=n_bonds,
+            virial=np.asarray(found["virial"], np.float64),
         )
 
     def stress(self, state: State) -> FloatArray:

@@ -113,6 +113,15 @@ class LocalEnergyModel:
         self.base = base
         self._compiled.move_to(*base.split)
 
+    def strain_along(self, axes: FloatArray) -> None:
+        """Take `strain_derivatives` by the strain of these axes (D,), 0 or 1 each, instead of all."""
+        self._compiled.strain_along(axes)
+
+    @property
+    def strain_derivatives(self) -> tuple[FloatArray, float]:
+        """(n,) derivative of the gradient by the strain, and second derivative of the energy, where a Hessian was last factorised."""
+        return self._compiled.coupling, self._compiled.strain_curvature
+
     def hold(self) -> None:
         """Store the base as the origin of `deform`."""
         self._compiled.hold()
@@ -222,10 +231,13 @@ class LocalEnergyModel:
         return LONGEST_STEP * 0.5 * self.landscape.length
 
     def _accepted(self, found: Any) -> Evaluation:
-        energy, gradient, strain_gradient, bond_force, n_bonds, crossing, unconverged = found
+        energy, gradient, strain_gradient, bond_force, n_bonds, crossing, unconverged, virial = (
+            found
+        )
         self.landscape.refuse(self._pairs, crossing, unconverged)
         bond_force /= max(n_bonds, 1)
-        return Evaluation(energy, gradient, strain_gradient, bond_force, n_bonds)
+        virial = virial.reshape(self.base.dimension, -1)
+        return Evaluation(energy, gradient, strain_gradient, bond_force, n_bonds, virial)
 
     def _renew(self, x: FloatArray, strain: float) -> None:
         self.base = State.joined(*self._compiled.poses)
