@@ -21,6 +21,9 @@ class BlockSystem {
   /// Adds the second derivatives of a pair with respect to the coordinates of its first and its
   /// second particle, a square matrix in columns.
   virtual void add(std::size_t pair, const double *by) = 0;
+  /// Adds those with respect to the displacement of the first particle relative to the second,
+  /// (D, D), of a pair without rotations.
+  virtual void add_shifts(std::size_t pair, const double *by) = 0;
   virtual Eigen::VectorXd diagonal() const = 0;
   virtual Eigen::VectorXd times(const Eigen::Ref<const Eigen::VectorXd> &vector) const = 0;
   /// Factors of the matrix plus a diagonal (n,); null if a pivot is not positive.
@@ -86,7 +89,7 @@ template <int BLOCK> class IteratedFactors : public Factors {
 };
 
 /// Block system of particles with only their first BLOCK coordinates.
-template <int BLOCK> class BlockSystemOf : public BlockSystem {
+template <int BLOCK, int D> class BlockSystemOf : public BlockSystem {
  public:
   explicit BlockSystemOf(const BlockPlan &plan) : most(plan.most), pairs(plan.pairs)
   {
@@ -126,6 +129,16 @@ template <int BLOCK> class BlockSystemOf : public BlockSystem {
     } else {
       hessian.below[block[p]] += i > j ? part(0, 1) : part(1, 0);
     }
+  }
+
+  void add_shifts(std::size_t p, const double *by) override
+  {
+    const Eigen::Map<const Eigen::Matrix<double, D, D>> own(by);
+    const int i = place(p, 0), j = place(p, 1);
+    if (i == j) return;  // a particle and its own image move together
+    hessian.diagonal[i].template topLeftCorner<D, D>() += own;
+    hessian.diagonal[j].template topLeftCorner<D, D>() += own;
+    hessian.below[block[p]].template topLeftCorner<D, D>() -= own;
   }
 
   Eigen::VectorXd diagonal() const override

@@ -3,6 +3,7 @@
 #include "contact/pair_derivatives.hpp"
 
 #include "landscape/block_system.hpp"
+#include "landscape/near_pairs.hpp"
 #include "packing/pair_sum.hpp"
 
 #include <algorithm>
@@ -12,31 +13,11 @@
 #include <cstdint>
 #include <Eigen/Core>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <vector>
 
 namespace jamshape {
-
-/// Poses of N particles and the box, in double-double: [0] the doubles, [1] the low parts.
-struct Poses {
-  using Numbers = std::vector<double>[2];
-  Numbers position;     // (N, D)
-  Numbers orientation;  // (N,) angles in the plane, (N, 4) quaternions in space
-  Numbers cell;         // (D, D) cell vectors as columns, upper triangular
-
-  static Split get(const Numbers &of, std::size_t k) { return {of[0][k], of[1][k]}; }
-  static void set(Numbers &of, std::size_t k, const Split &to)
-  {
-    of[0][k] = to.value;
-    of[1][k] = to.rest;
-  }
-
-  /// A view to be strained.
-  SplitPoses view(double strain) const
-  {
-    const auto parts = [](const Numbers &of) { return std::array{of[0].data(), of[1].data()}; };
-    return {parts(position), parts(orientation), parts(cell), strain};
-  }
-};
 
 /// Layout of the coordinates: column (N, D + rotations), -1 for none; rotations are measured as
 /// lengths, and move a surface by at most the turning radius per radian.
@@ -44,18 +25,6 @@ struct Coordinates {
   std::size_t n;
   std::vector<std::int64_t> column;
   std::vector<double> radians_per_length, turning_radius;
-};
-
-/// Pairs whose surfaces were closer than `skin` at some poses, and centres closer than `reach`.
-struct NearPairs {
-  std::vector<std::int64_t> particles, shift;  // (M, 2), (M, D)
-  Poses then;
-  double skin, reach;
-  // Motion from `then` to the base, apart from the box's strain: (N, D) displacements, and (N,)
-  // angles, in 3D (N, 4) quaternions.
-  std::vector<double> moved{}, turned{};
-
-  PairList list() const { return {particles.size() / 2, particles.data(), shift.data()}; }
 };
 
 /// A point near the base: a displacement, then an affine strain of box and positions.
@@ -190,14 +159,14 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   void move_to(const Poses &poses) override
   {
     base = poses;
-    if (has_pairs()) measure(pairs);
+    if (has_pairs()) measure_pairs();
   }
 
   void move(const Displacement &at) override
   {
     displace(base, at);
     settle(base, at.strain);
-    if (has_pairs()) measure(pairs);
+    if (has_pairs()) measure_pairs();
   }
 
   void hold() override { held = base; }
@@ -214,7 +183,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     }
     for (int column = 0; column < D; ++column) map_vector(base.cell, column, D, matrix);
     settle(base, 0.0);
-    if (has_pairs()) measure(pairs);
+    if (has_pairs()) measure_pairs();
   }
 
   void take(NearPairs wider, double smaller_skin) override
@@ -256,19 +225,26 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
 
   LandscapeSums evaluate(const Displacement &at, bool extended) const override
   {
-    return extended ? sums<long double>(at) : sums<double>(at);
+    Team *const by = team_for(pairs.list().n);
+    if (!extended) {
+      return sums_of(sum_over(parts, moved_to(at), remembers ? starts.data() : nullptr, by), at);
+    }
+    std::vector<PairSums<D, long double>> in_long;
+    return sums_of(sum_over(in_long, posed_at<long double>(pairs, at), nullptr, by), at);
   }
 
   double part_within(const double *step, const StepBounds &bounds) const override
   {
     const Displacement by{step, 0.0};
-    double excess = 1.0;
+    double farthest_sq = 0.0, excess = 1.0;
     for (std::size_t i = 0; i < shapes.size(); ++i) {
+      farthest_sq = std::max(farthest_sq, norm_sq(shift(by, i)));
+      if (!turns(i)) continue;
       const double widest =
           std::max(bounds.widest, std::min(WIDE, bounds.longest / coordinates.turning_radius[i]));
-      excess = std::max(
-          {excess, norm(shift(by, i)) / bounds.longest, std::abs(angle_of(turn(by, i))) / widest});
+      excess = std::max(excess, std::abs(angle_of(turn(by, i))) / widest);
     }
+    excess = std::max(excess, std::sqrt(farthest_sq) / bounds.longest);
     return 1.0 / excess;
   }
 
@@ -289,8 +265,8 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   void differentiate(const Displacement &at) override
   {
     if (!hessian) hessian = block_system();
-    const PosedPairs<Model, D, double> posed = posed_at<double>(pairs, at);
-    const TurnedBodies<Model, D, double> turned_bodies(posed);
+    const Moved &posed = moved_to(at);
+    const TurnedBodies<Moved> turned_bodies(posed);
     hessian->clear();
     pulled = Eigen::VectorXd::Zero(n());
     find_axes(at);
@@ -348,6 +324,8 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   using Start = typename Model::template Start<D>;
   using PairMatrix = Eigen::Matrix<double, VARIABLES, VARIABLES>;
   using PairRow = Eigen::Matrix<double, VARIABLES, 1>;
+  using Posed = PosedPairs<Model, D, double>;
+  using Moved = MovedPairs<Model, D>;
 
   /// Largest rotation of nearly round particles in one step, if their surface stays within its
   /// bound.
@@ -364,10 +342,12 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   /// above this multiple of the bond's.
   static constexpr double STIFFEST = 1e4;
 
-  /// A touching pair, and second derivatives with respect to its variables.
+  /// A touching pair, and second derivatives with respect to its variables; of those of particles
+  /// that no contact can rotate only r is set.
   struct Curved {
     std::size_t p;
     Vec<D> r;
+    bool turns;
     PairMatrix by;
   };
 
@@ -383,7 +363,12 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   Laws<Law> laws;
   Poses held;
   Poses base;
-  mutable Poses there;                   // at the last point
+  mutable Poses there;                   // at the last point that needed extended precision
+  mutable std::optional<Moved> moved;    // `pairs`, once they are chosen
+  mutable Displacement last{};           // the point of `moved`
+  mutable std::optional<Posed> exact;    // at that point, if any contact needed it
+  mutable std::mutex guard;              // of `exact`
+  mutable std::vector<PairSums<D, double>> parts;  // work space
   std::unique_ptr<BlockSystem> hessian;  // none before pairs are known
   Eigen::VectorXd pulled;
   std::unique_ptr<Team> team;
@@ -393,10 +378,9 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
 
   Fill fill() const { return D == 2 || shapes.size() <= FEW ? Fill::COMPLETE : Fill::NONE; }
 
-  template <class S> LandscapeSums sums(const Displacement &at) const
+  template <class S>
+  LandscapeSums sums_of(const PairSums<D, S> &sums, const Displacement &at) const
   {
-    const PairSums<D, S> sums =
-        sum_over(posed_at<S>(pairs, at), begins<S>(), team_for(pairs.list().n));
     S trace = 0.0;
     for (int k = 0; k < D; ++k) trace += sums.virial[(D + 1) * k];
     return {static_cast<double>(sums.energy),
@@ -408,10 +392,36 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
             of_wide(sums.unconverged)};
   }
 
-  template <class S> StartIn<Model, D, S> *begins() const
+  /// The pairs at a point, in doubles.
+  const Moved &moved_to(const Displacement &at) const
   {
-    if constexpr (std::is_same_v<S, double>) return remembers ? starts.data() : nullptr;
-    return nullptr;
+    last = at;
+    exact.reset();
+    moved->strain = at.strain;
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      moved->displace(i, shift_since(pairs, at, i));
+      if (turns(i)) moved->turn(i, orientation_at(at, i));
+    }
+    return *moved;
+  }
+
+  Quaternion orientation_at(const Displacement &at, std::size_t i) const
+  {
+    const double *const now = &base.orientation[0][TURNS * i];
+    if constexpr (D == 2) {
+      const double half = 0.5 * (now[0] + (base.orientation[1][i] + turn(at, i)[0]));
+      return {std::cos(half), 0.0, 0.0, std::sin(half)};
+    } else {
+      return turned(normalized(Quaternion{now[0], now[1], now[2], now[3]}), turn(at, i));
+    }
+  }
+
+  /// One of the pairs at the point of `moved`, in long doubles.
+  PosedPair<Model, D, long double> exactly(std::size_t p) const
+  {
+    const std::lock_guard<std::mutex> lock(guard);
+    if (!exact) exact.emplace(posed_at<double>(pairs, last));
+    return exact->pair_in_long(p);
   }
 
   /// Pairs of a list at a point, valid until another point is evaluated.
@@ -431,7 +441,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   {
     Eigen::VectorXd found = Eigen::VectorXd::Zero(n());
     for (std::size_t i = 0; i < shapes.size(); ++i) {
-      const Torque<D, S> turning = about_axes(i, by_turn(turn(at, i), sums.torque[i]));
+      const Torque<D, S> turning = about_axes(i, by_turn(turn(at, i), sums.torque_on(i)));
       for (int k = 0; k < BLOCK; ++k) {
         const std::int64_t c = coordinates.column[BLOCK * i + k];
         if (c < 0) continue;
@@ -495,34 +505,47 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     }
   }
 
-  /// Growth of the box since a list was made: the map from its cell vectors then to those now,
-  /// upper triangular like both.
-  std::array<Vec<D>, D> growth(const NearPairs &list) const
+  /// Strain of the box since a list was made: the map from its cell vectors then to those now,
+  /// upper triangular like both, minus the identity.
+  std::vector<double> strain_since(const NearPairs &list) const
   {
-    const std::vector<double> &now = base.cell[0], &then = list.then.cell[0];
-    std::array<Vec<D>, D> change{};
+    const std::vector<double> &then = list.then.cell[0];
+    std::vector<double> strain(D * D);
     for (int k = 0; k < D; ++k) {
       for (int m = k; m < D; ++m) {
-        double left = now[D * k + m];
-        for (int l = k; l < m; ++l) left -= change[k][l] * then[D * l + m];
-        change[k][m] = left / then[D * m + m];
+        double left = since(base.cell, list.then.cell, D * k + m);
+        for (int l = k; l < m; ++l) left -= strain[D * k + l] * then[D * l + m];
+        strain[D * k + m] = left / then[D * m + m];
       }
     }
-    return change;
+    return strain;
+  }
+
+  /// Change of a number.
+  static double since(const Poses::Numbers &now, const Poses::Numbers &then, std::size_t k)
+  {
+    const Split change = difference(Poses::get(now, k), Poses::get(then, k));
+    return change.value + change.rest;
+  }
+
+  void measure_pairs()
+  {
+    measure(pairs);
+    moved->strain_by(pairs.strain);
   }
 
   void measure(NearPairs &list) const
   {
     list.moved.resize(D * shapes.size());
     list.turned.resize(TURNS * shapes.size());
-    const auto change = growth(list);
+    list.strain = strain_since(list);
     for (std::size_t c = 0; c < list.moved.size(); ++c) {
       const std::size_t k = c % D;
-      double affine = change[k][k] * list.then.position[0][c];
-      for (std::size_t m = k + 1; m < D; ++m) {
-        affine += change[k][m] * list.then.position[0][c - k + m];
+      double affine = 0.0;
+      for (std::size_t m = k; m < D; ++m) {
+        affine += list.strain[D * k + m] * list.then.position[0][c - k + m];
       }
-      list.moved[c] = base.position[0][c] - affine;
+      list.moved[c] = since(base.position, list.then.position, c) - affine;
     }
     for (std::size_t i = 0; i < shapes.size(); ++i) {
       if (turns(i)) measure_turn(list, i);
@@ -563,15 +586,15 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   static double angle_of(const Vec<1> &turn) { return turn[0]; }
   static double angle_of(const Vec<3> &turn) { return norm(turn); }
 
-  /// Bound of the relative change of a vector by the box's growth and then by a stretch.
-  double box_strain(const NearPairs &list, double stretch) const
+  /// Bound of the relative change of a vector by the box's strain and then by a stretch.
+  static double box_strain(const NearPairs &list, double stretch)
   {
-    const auto change = growth(list);
     double scaled = 0.0, sheared_sq = 0.0;
     for (int k = 0; k < D; ++k) {
-      scaled = std::max(scaled, std::abs(stretch * change[k][k] - 1.0));
+      scaled = std::max(scaled, std::abs(stretch * (1.0 + list.strain[(D + 1) * k]) - 1.0));
       for (int m = k + 1; m < D; ++m) {
-        sheared_sq += stretch * change[k][m] * stretch * change[k][m];
+        const double sheared = stretch * list.strain[D * k + m];
+        sheared_sq += sheared * sheared;
       }
     }
     return scaled + std::sqrt(sheared_sq);
@@ -580,15 +603,27 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   /// Whether the gap of two surfaces may have shrunk by the skin, or by what remains of it.
   bool is_beyond(const NearPairs &list, const Displacement &at, double kept = 0.0) const
   {
-    double most = 0.0;
-    const double stretch = 1.0 + at.strain, scaled = box_strain(list, stretch);
+    double most = 0.0, most_sq = 0.0;
+    const double stretch = 1.0 + at.strain;
     for (std::size_t i = 0; i < shapes.size(); ++i) {
-      Vec<D> by = shift(at, i);
-      for (int k = 0; k < D; ++k) by[k] += list.moved[D * i + k];
-      const double turned = turns(i) ? coordinates.turning_radius[i] * turned_to(list, at, i) : 0.0;
-      most = std::max(most, stretch * norm(by) + turned);
+      const Vec<D> by = shift_since(list, at, i);
+      if (turns(i)) {
+        const double turned = coordinates.turning_radius[i] * turned_to(list, at, i);
+        most = std::max(most, stretch * norm(by) + turned);
+      } else {
+        most_sq = std::max(most_sq, norm_sq(by));
+      }
     }
-    return 2.0 * most >= list.skin - kept - scaled * list.reach;
+    most = std::max(most, stretch * std::sqrt(most_sq));
+    return 2.0 * most >= list.skin - kept - box_strain(list, stretch) * list.reach;
+  }
+
+  /// Displacement of a particle at a point since a list was made, apart from the box's strain.
+  Vec<D> shift_since(const NearPairs &list, const Displacement &at, std::size_t i) const
+  {
+    Vec<D> by = shift(at, i);
+    for (int k = 0; k < D; ++k) by[k] += list.moved[D * i + k];
+    return by;
   }
 
   /// Chooses the wide pairs that are within the smaller skin at a point.
@@ -605,7 +640,8 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     }
     pairs.then = there;
     settle(pairs.then, at.strain);
-    measure(pairs);
+    moved.emplace(shapes, pairs, laws, [this](std::size_t p) { return exactly(p); });
+    measure_pairs();
     starts.assign(pairs.list().n, {});
     hessian = nullptr;
   }
@@ -711,8 +747,8 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   std::unique_ptr<BlockSystem> block_system() const
   {
     const BlockPlan plan{coordinates.column, pairs.particles, shapes.size(), BLOCK, fill()};
-    if (any_turns()) return std::make_unique<BlockSystemOf<BLOCK>>(plan);
-    return std::make_unique<BlockSystemOf<D>>(plan);
+    if (any_turns()) return std::make_unique<BlockSystemOf<BLOCK, D>>(plan);
+    return std::make_unique<BlockSystemOf<D, D>>(plan);
   }
 
   /// Whether any of the coordinates is a rotation.
@@ -768,26 +804,52 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   }
 
   template <class Then>
-  void each_curved(const PosedPairs<Model, D, double> &posed,
-                   const TurnedBodies<Model, D, double> &turned_bodies, const Range &part,
+  void each_curved(const Moved &posed, const TurnedBodies<Moved> &turned_bodies, const Range &part,
                    const Then &then) const
   {
     for (std::size_t p = part.first; p < part.last; ++p) {
       const Vec<D> r = posed.separation(p);
       Start start = remembers ? starts[p] : Start{};
       if (!posed.may_touch(p, r)) continue;
-      const ContactOf<Model, D> contact = posed.contact(p, r, &start);
+      const ContactOf<Model, D> contact = contact_in(posed, p, r, &start);
       if (contact.status != ContactStatus::TOUCHING) continue;
-      const DualContact dual = turned_bodies.contact(p, &start);
-      if (dual.status == ContactStatus::TOUCHING) {
-        then(Curved{p, r, by_variables(p, contact, dual)});
+      Curved found{p, r, posed.pair_turns(p), {}};
+      if (found.turns) {
+        const DualContact dual = turned_bodies.contact(p, r, &start);
+        if (dual.status != ContactStatus::TOUCHING) continue;
+        found.by = by_variables(p, contact, dual);
+      } else {
+        found.by.template topLeftCorner<D, D>() =
+            Eigen::Map<const Eigen::Matrix<double, D, D>>(&central_hessian<Model>(contact, r)[0][0]);
       }
+      then(found);
+    }
+  }
+
+  /// Adds a pair of particles that no contact can rotate.
+  void add_round(const Curved &pair, double stretch)
+  {
+    const Eigen::Matrix<double, D, D> by =
+        stretch * stretch * pair.by.template topLeftCorner<D, D>();
+    hessian->add_shifts(pair.p, by.data());
+    const Eigen::Map<const Eigen::Matrix<double, D, 1>> r(pair.r.c);
+    add_pull(pair.p, 0, by * r / stretch);
+    add_pull(pair.p, 1, -by * r / stretch);
+  }
+
+  /// Adds the force by which the strain pulls the first or second particle of a pair.
+  template <class Pull> void add_pull(std::size_t p, int side, const Pull &pull)
+  {
+    const std::int64_t *const own = &coordinates.column[BLOCK * pairs.particles[2 * p + side]];
+    for (int k = 0; k < Pull::RowsAtCompileTime; ++k) {
+      if (own[k] >= 0) pulled[own[k]] += pull[k];
     }
   }
 
   void add_pair(const Curved &pair, double stretch)
   {
-    const auto &[p, r, by] = pair;
+    if (!pair.turns) return add_round(pair, stretch);
+    const auto &[p, r, turns, by] = pair;
     double scale[2][BLOCK];
     for (int side = 0; side < 2; ++side) {
       const std::size_t particle = pairs.particles[2 * p + side];
@@ -822,12 +884,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
           (scaled.template middleCols<TURN>(first) * to).eval();
     }
     hessian->add(p, scaled.data());
-    for (int side = 0; side < 2; ++side) {
-      for (int k = 0; k < BLOCK; ++k) {
-        const std::int64_t c = coordinates.column[BLOCK * pairs.particles[2 * p + side] + k];
-        if (c >= 0) pulled[c] += pull[side][k];
-      }
-    }
+    for (int side = 0; side < 2; ++side) add_pull(p, side, pull[side]);
   }
 };
 

@@ -201,6 +201,7 @@ struct SuperellipsoidModel {
   static constexpr int MOST_BONDS = 1;
   static constexpr bool HAS_SIDES = false;
   static constexpr bool BONDS_ARE_CONTACTS = false;
+  static constexpr int OVERLAP_POWER = 2;
 
   static Law law(double epsilon, Sides, bool shortcuts = true) { return {epsilon, shortcuts}; }
   static double k_e(const Law &law) { return law.epsilon; }
