@@ -33,10 +33,12 @@ class BlockSystem {
 };
 
 /// Layout of a block system: N particles, whose at most `most` coordinates have the numbers column
-/// (N, most), -1 for none, and pairs of them (M, 2).
+/// (N, most), -1 for none, and pairs of them (M, 2), of which only those are added that are `used`
+/// (M,).
 struct BlockPlan {
   const std::vector<std::int64_t> &column;
   const std::vector<std::int64_t> &pairs;
+  const std::vector<char> &used;
   std::size_t N;
   int most;
   Fill fill;
@@ -98,10 +100,14 @@ template <int BLOCK, int D> class BlockSystemOf : public BlockSystem {
       const auto first = plan.column.begin() + i * most;
       column.insert(column.end(), first, first + BLOCK);
     }
-    pattern = std::make_shared<BlockPattern>(std::move(column), pairs, plan.N, plan.fill);
+    std::vector<std::int64_t> coupled;
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+      if (plan.used[k / 2]) coupled.push_back(pairs[k]);
+    }
+    pattern = std::make_shared<BlockPattern>(std::move(column), coupled, plan.N, plan.fill);
     for (std::size_t p = 0; p < pairs.size() / 2; ++p) {
       const int i = place(p, 0), j = place(p, 1);
-      block.push_back(pattern->find(std::min(i, j), std::max(i, j)));
+      block.push_back(plan.used[p] ? pattern->find(std::min(i, j), std::max(i, j)) : -1);
     }
   }
 
@@ -193,7 +199,7 @@ template <int BLOCK, int D> class BlockSystemOf : public BlockSystem {
   int most;
   std::vector<std::int64_t> pairs;
   std::shared_ptr<const BlockPattern> pattern;
-  std::vector<int> block;  // (M,) block of each pair below the diagonal
+  std::vector<int> block;  // (M,) block of each used pair below the diagonal
   BlockMatrix<BLOCK> hessian;
   std::vector<std::shared_ptr<BlockFactors<BLOCK>>> made;
   BlockKernels kernels = block_kernels<BLOCK>();

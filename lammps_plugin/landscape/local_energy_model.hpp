@@ -101,9 +101,10 @@ class LocalEnergyModel {
   /// (n,).
   virtual double largest_part(const double *vector) const = 0;
 
-  /// Computes second derivatives with respect to the base's coordinates, for the functions below.
-  /// In 3D at points without rotations. Crossing spines contribute nothing.
-  virtual void differentiate(const Displacement &at) = 0;
+  /// Computes second derivatives with respect to the base's coordinates, for the functions below,
+  /// whose factors will have at most this fill-in. In 3D at points without rotations. Crossing
+  /// spines contribute nothing.
+  virtual void differentiate(const Displacement &at, Fill most) = 0;
   /// (n,) derivative of the gradient with respect to the strain, at that point.
   virtual const Eigen::VectorXd &coupling() const = 0;
   /// (n,) diagonal of the Hessian at that point.
@@ -113,7 +114,7 @@ class LocalEnergyModel {
   /// (n,) for displacements the largest of their diagonal elements, for rotations that of theirs:
   /// nearly round particles rotate far more easily than they move.
   virtual Eigen::VectorXd largest_of_kind() const = 0;
-  /// Whether `factors` are those of the Hessian, or of an approximation.
+  /// Whether `factors` can be those of the Hessian, or only of an approximation.
   virtual bool has_complete_factors() const = 0;
   /// Factors of that Hessian plus a diagonal (n,); null if a pivot is not positive.
   virtual std::shared_ptr<Factors> factors(const Eigen::VectorXd &diagonal) = 0;
@@ -122,7 +123,7 @@ class LocalEnergyModel {
   /// null for non-finite matrices.
   std::shared_ptr<Factors> factorise(const Displacement &at, const Eigen::VectorXd &added)
   {
-    differentiate(at);
+    differentiate(at, Fill::COMPLETE);
     const Eigen::VectorXd sum = diagonal() + added;
     if (!sum.allFinite()) return nullptr;
     const double smallest = sum.size() > 0 ? sum.minCoeff() : 1.0;
@@ -215,7 +216,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   void follow_bodies() override
   {
     along_bodies = true;
-    hessian = nullptr;
+    forget_systems();
   }
 
   void share(std::size_t threads) override
@@ -262,14 +263,18 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     return std::sqrt(most);
   }
 
-  void differentiate(const Displacement &at) override
+  void differentiate(const Displacement &at, Fill most) override
   {
-    if (!hessian) hessian = block_system();
+    const Fill with = most == Fill::COMPLETE ? fill() : most;
     const Moved &posed = moved_to(at);
-    const TurnedBodies<Moved> turned_bodies(posed);
+    std::unique_ptr<BlockSystem> &own = systems[with == Fill::COMPLETE];
+    if (!own || with == Fill::NONE) own = block_system(posed, with);
+    hessian = own.get();
     hessian->clear();
     pulled = Eigen::VectorXd::Zero(n());
     find_axes(at);
+    std::optional<TurnedBodies<Moved>> turned_bodies;
+    if (any_turns()) turned_bodies.emplace(posed);
     Team *const by = team_for(posed.size());
     curved.resize(parts_of(by));
     in_parts(by, posed.size(), [&](std::size_t k, const Range &part) {
@@ -369,7 +374,8 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   mutable std::optional<Posed> exact;    // at that point, if any contact needed it
   mutable std::mutex guard;              // of `exact`
   mutable std::vector<PairSums<D, double>> parts;  // work space
-  std::unique_ptr<BlockSystem> hessian;  // none before pairs are known
+  std::unique_ptr<BlockSystem> systems[2];  // without fill-in and with it, once they are used
+  BlockSystem *hessian = nullptr;           // the one last used
   Eigen::VectorXd pulled;
   std::unique_ptr<Team> team;
   std::vector<std::vector<Curved>> curved;  // for each thread, empty between uses
@@ -441,7 +447,8 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   {
     Eigen::VectorXd found = Eigen::VectorXd::Zero(n());
     for (std::size_t i = 0; i < shapes.size(); ++i) {
-      const Torque<D, S> turning = about_axes(i, by_turn(turn(at, i), sums.torque_on(i)));
+      Torque<D, S> turning{};
+      if (turns(i)) turning = about_axes(i, by_turn(turn(at, i), sums.torque[i]));
       for (int k = 0; k < BLOCK; ++k) {
         const std::int64_t c = coordinates.column[BLOCK * i + k];
         if (c < 0) continue;
@@ -479,7 +486,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   template <class S> Torque<D, S> about_axes(std::size_t i, const Torque<D, S> &torque) const
   {
     if constexpr (D == 3) {
-      if (along_bodies && turns(i)) {
+      if (along_bodies) {
         Torque<D, S> found;
         for (int b = 0; b < 3; ++b) found[b] = dot(constants_of<S>(axis_of(i, b)), torque);
         return found;
@@ -513,7 +520,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     std::vector<double> strain(D * D);
     for (int k = 0; k < D; ++k) {
       for (int m = k; m < D; ++m) {
-        double left = since(base.cell, list.then.cell, D * k + m);
+        double left = rounded(joined(since(base.cell, list.then.cell, D * k + m)));
         for (int l = k; l < m; ++l) left -= strain[D * k + l] * then[D * l + m];
         strain[D * k + m] = left / then[D * m + m];
       }
@@ -522,10 +529,9 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   }
 
   /// Change of a number.
-  static double since(const Poses::Numbers &now, const Poses::Numbers &then, std::size_t k)
+  static Split since(const Poses::Numbers &now, const Poses::Numbers &then, std::size_t k)
   {
-    const Split change = difference(Poses::get(now, k), Poses::get(then, k));
-    return change.value + change.rest;
+    return difference(Poses::get(now, k), Poses::get(then, k));
   }
 
   void measure_pairs()
@@ -540,15 +546,26 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     list.turned.resize(TURNS * shapes.size());
     list.strain = strain_since(list);
     for (std::size_t c = 0; c < list.moved.size(); ++c) {
-      const std::size_t k = c % D;
-      double affine = 0.0;
-      for (std::size_t m = k; m < D; ++m) {
-        affine += list.strain[D * k + m] * list.then.position[0][c - k + m];
-      }
-      list.moved[c] = since(base.position, list.then.position, c) - affine;
+      const Split change = since(base.position, list.then.position, c);
+      list.moved[c] = change.value + change.rest;
     }
+    const auto is_zero = [](double x) { return x == 0.0; };
+    if (!std::all_of(list.strain.begin(), list.strain.end(), is_zero)) subtract_strain(list);
     for (std::size_t i = 0; i < shapes.size(); ++i) {
       if (turns(i)) measure_turn(list, i);
+    }
+  }
+
+  /// Subtracts the displacements with the box, in long doubles: they grow with its size.
+  void subtract_strain(NearPairs &list) const
+  {
+    for (std::size_t c = 0; c < list.moved.size(); ++c) {
+      const std::size_t k = c % D;
+      long double own = joined(since(base.position, list.then.position, c));
+      for (std::size_t m = k; m < D; ++m) {
+        own -= list.strain[D * k + m] * joined(Poses::get(list.then.position, c - k + m));
+      }
+      list.moved[c] = rounded(own);
     }
   }
 
@@ -643,7 +660,13 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     moved.emplace(shapes, pairs, laws, [this](std::size_t p) { return exactly(p); });
     measure_pairs();
     starts.assign(pairs.list().n, {});
+    forget_systems();
+  }
+
+  void forget_systems()
+  {
     hessian = nullptr;
+    for (auto &one : systems) one = nullptr;
   }
 
   template <class Then> void each_coordinate(const Then &then) const
@@ -743,10 +766,15 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     }
   }
 
-  /// The block system, with blocks of displacements alone if nothing can rotate.
-  std::unique_ptr<BlockSystem> block_system() const
+  /// The block system, with blocks of displacements alone if nothing can rotate. One without fill-in
+  /// is made in no time, so that it leaves out the pairs that do not touch.
+  std::unique_ptr<BlockSystem> block_system(const Moved &posed, Fill with) const
   {
-    const BlockPlan plan{coordinates.column, pairs.particles, shapes.size(), BLOCK, fill()};
+    std::vector<char> used(posed.size(), 1);
+    for (std::size_t p = 0; p < posed.size() && with == Fill::NONE; ++p) {
+      used[p] = posed.may_touch(p, posed.separation(p));
+    }
+    const BlockPlan plan{coordinates.column, pairs.particles, used, shapes.size(), BLOCK, with};
     if (any_turns()) return std::make_unique<BlockSystemOf<BLOCK, D>>(plan);
     return std::make_unique<BlockSystemOf<D, D>>(plan);
   }
@@ -762,22 +790,18 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
 
   /// Second derivatives with respect to the variables of a touching pair; those of rotating faces
   /// in contact are bounded.
-  PairMatrix by_variables(std::size_t p, const ContactOf<Model, D> &contact,
-                          const DualContact &dual) const
+  PairMatrix by_variables(std::size_t p, const DualContact &dual) const
   {
-    SecondDerivatives<D, double, Model::MOST_BONDS> found{};
+    SecondDerivatives<D, double, Model::MOST_BONDS> found;
     read_derivatives(dual, found);
     const PairMatrix turning = Eigen::Map<const PairMatrix>(&found.curvature[0][0]);
     PairMatrix by = PairMatrix::Zero();
     double stiffest = 0.0;
-    for (int b = 0; b < contact.n_bonds; ++b) {
-      const Bond<D> &bond = contact.bond[b];
-      PairRow along;
-      std::copy_n(bond.normal.c, D, along.data());
-      std::copy_n(bond.lever_i.c, ROTATIONS<D>, along.data() + FIRST_OF_I<D>);
-      std::copy_n(bond.lever_j.c, ROTATIONS<D>, along.data() + FIRST_OF_J<D>);
-      by += bond.own_stiffness * along * along.transpose();
-      stiffest += STIFFEST * bond.own_stiffness;
+    for (int b = 0; b < dual.n_bonds; ++b) {
+      const double own = value_of(dual.bond[b].own_stiffness);
+      const Eigen::Map<const PairRow> along(found.gradient[b]);
+      by += own * along * along.transpose();
+      stiffest += STIFFEST * own;
     }
     const PairRow part = per_length(p);
     const double largest = (part.asDiagonal() * turning * part.asDiagonal()).cwiseAbs().maxCoeff();
@@ -804,23 +828,24 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   }
 
   template <class Then>
-  void each_curved(const Moved &posed, const TurnedBodies<Moved> &turned_bodies, const Range &part,
-                   const Then &then) const
+  void each_curved(const Moved &posed, const std::optional<TurnedBodies<Moved>> &turned_bodies,
+                   const Range &part, const Then &then) const
   {
     for (std::size_t p = part.first; p < part.last; ++p) {
       const Vec<D> r = posed.separation(p);
       Start start = remembers ? starts[p] : Start{};
       if (!posed.may_touch(p, r)) continue;
-      const ContactOf<Model, D> contact = contact_in(posed, p, r, &start);
-      if (contact.status != ContactStatus::TOUCHING) continue;
       Curved found{p, r, posed.pair_turns(p), {}};
       if (found.turns) {
-        const DualContact dual = turned_bodies.contact(p, r, &start);
+        const DualContact dual = turned_bodies->contact(p, r, &start);
         if (dual.status != ContactStatus::TOUCHING) continue;
-        found.by = by_variables(p, contact, dual);
+        found.by = by_variables(p, dual);
       } else {
+        const ContactOf<Model, D> contact = contact_in(posed, p, r, &start);
+        if (contact.status != ContactStatus::TOUCHING) continue;
         found.by.template topLeftCorner<D, D>() =
-            Eigen::Map<const Eigen::Matrix<double, D, D>>(&central_hessian<Model>(contact, r)[0][0]);
+            Eigen::Map<const Eigen::Matrix<double, D, D>>(
+                &central_hessian<Model>(contact, r)[0][0]);
       }
       then(found);
     }

@@ -5,6 +5,7 @@
 #include "contact/pair_derivatives.hpp"
 
 #include "packing/pair_sum.hpp"
+#include "packing/split.hpp"
 
 #include <array>
 #include <cmath>
@@ -73,21 +74,24 @@ template <class Model, int D> class MovedPairs : public BodyPairs<Model, D, doub
     for (std::size_t p = 0; p < posed.size(); ++p) {
       const double reach = this->around[first(p)] + this->around[second(p)];
       reach_sq.push_back(reach * reach);
-      before.push_back(posed.separation(p));
+      before.push_back(posed.template separation_in<long double>(p));
     }
-    apart = before;
+    apart.resize(before.size());
+    strain_by(std::vector<double>(D * D));
   }
 
   /// Strains all separations with the box since that time, (D, D), upper triangular.
-  void strain_by(const std::vector<double> &strain)
+  void strain_by(const std::vector<double> &strain_of_box)
   {
-    if (strain == strained_by) return;
-    strained_by = strain;
+    if (strain_of_box == strained_by) return;
+    strained_by = strain_of_box;
     for (std::size_t p = 0; p < before.size(); ++p) {
       for (int k = 0; k < D; ++k) {
-        double grown = 0.0;
-        for (int m = k; m < D; ++m) grown += strain[D * k + m] * before[p][m];
-        apart[p][k] = before[p][k] + grown;
+        long double grown = before[p][k];
+        for (int m = k; m < D; ++m) grown += strained_by[D * k + m] * before[p][m];
+        const Split parts = split(grown);
+        apart[p].value[k] = parts.value;
+        apart[p].rest[k] = parts.rest;
       }
     }
   }
@@ -105,8 +109,9 @@ template <class Model, int D> class MovedPairs : public BodyPairs<Model, D, doub
 
   Vec<D> separation(std::size_t p) const
   {
-    const Vec<D> r = apart[p] + (shift[first(p)] - shift[second(p)]);
-    return r + strain * r;
+    const auto &[value, rest] = apart[p];
+    const Vec<D> small = rest + (shift[first(p)] - shift[second(p)]);
+    return value + (small + strain * (value + small));  // one rounding of the size of r
   }
 
   bool may_touch(std::size_t p, const Vec<D> &r) const { return norm_sq(r) < reach_sq[p]; }
@@ -120,7 +125,11 @@ template <class Model, int D> class MovedPairs : public BodyPairs<Model, D, doub
 
  private:
   std::function<InLong(std::size_t)> exact;
-  std::vector<Vec<D>> before, apart;  // separations then, and with the box's strain
+  struct Apart {
+    Vec<D> value, rest;
+  };
+  std::vector<Vec<D, long double>> before;  // separations then
+  std::vector<Apart> apart;                 // the same with the box's strain
   std::vector<double> strained_by;
   std::vector<double> reach_sq;  // squared distances at which bounding spheres touch
   std::vector<Vec<D>> shift;
