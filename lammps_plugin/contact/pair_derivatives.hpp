@@ -176,9 +176,10 @@ void read_derivatives(const Contact<D, Dual<PAIR_VARIABLES<D>, S>, BONDS> &dual,
 /// A square matrix.
 template <int N, class S = double> using Square = std::array<std::array<S, N>, N>;
 
-/// Second derivatives with respect to r of the energy of a touching contact of two particles that no
-/// contact can rotate, in closed form. V depends on |r| alone, through the overlap 1 - (|r|/d)^m:
-/// the bonds' stiffness along n = r/|r|, and from the force F a curvature -F/|r| (1 + (m - 2) n n).
+/// Second derivatives with respect to r of the energy of a touching contact of two particles that
+/// no contact can rotate, in closed form. V depends on |r| alone, through the overlap 1 -
+/// (|r|/d)^m: the bonds' stiffness along n = r/|r|, and from the force F a curvature -F/|r| (1 + (m
+/// - 2) n n).
 template <class Model, int D, class S>
 Square<D, S> central_hessian(const ContactOf<Model, D, S> &contact, const Vec<D, S> &r)
 {

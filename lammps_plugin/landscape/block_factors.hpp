@@ -82,7 +82,8 @@ struct BlockPattern {
   std::vector<LeftBlock> left;  // ascending within a row
 
  private:
-  /// An order of elimination with little fill-in (approximate minimum degree), if there will be any.
+  /// An order of elimination with little fill-in (approximate minimum degree), if there will be
+  /// any.
   std::vector<int> ordered(std::size_t N, const std::vector<std::int64_t> &pairs) const
   {
     if (fill == Fill::NONE) {

@@ -107,7 +107,8 @@ template <> void Square<3>::put(double *block) const
 
 /// Subtracts from a third block the product of a block and another one, whose (k, c) is part[BLOCK
 /// * k + c].
-template <int BLOCK> void take_product(const double *a, const double *part, double *from)
+template <int BLOCK>
+[[gnu::always_inline]] inline void take_product(const double *a, const double *part, double *from)
 {
   Square<BLOCK> left, rest;
   left.load(a);

@@ -34,9 +34,10 @@ struct BlockKernels {
   void (*multiply)(const BlockView &matrix, const double *x, double *y);
 };
 
-/// Kernels of the method L-BFGS: adds `by` times a vector (n,) to x, and returns the dot product of x
-/// and a further one. Single precision halves the time, which is that of reading them.
-using AddAndDot = double (*)(int n, double by, const float *vector, const float *further, double *x);
+/// Kernels of the method L-BFGS: adds `by` times a vector (n,) to x, and returns the dot product of
+/// x and a further one. Single precision halves the time, which is that of reading them.
+using AddAndDot = double (*)(int n, double by, const float *vector, const float *further,
+                             double *x);
 template <InstructionSet SET> AddAndDot add_and_dot_of();
 
 /// Compiled in block_kernels.cpp for each instruction set.

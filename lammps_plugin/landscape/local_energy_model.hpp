@@ -368,11 +368,11 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   Laws<Law> laws;
   Poses held;
   Poses base;
-  mutable Poses there;                   // at the last point that needed extended precision
-  mutable std::optional<Moved> moved;    // `pairs`, once they are chosen
-  mutable Displacement last{};           // the point of `moved`
-  mutable std::optional<Posed> exact;    // at that point, if any contact needed it
-  mutable std::mutex guard;              // of `exact`
+  mutable Poses there;                 // at the last point that needed extended precision
+  mutable std::optional<Moved> moved;  // `pairs`, once they are chosen
+  mutable Displacement last{};         // the point of `moved`
+  mutable std::optional<Posed> exact;  // at that point, if any contact needed it
+  mutable std::mutex guard;            // of `exact`
   mutable std::vector<PairSums<D, double>> parts;  // work space
   std::unique_ptr<BlockSystem> systems[2];  // without fill-in and with it, once they are used
   BlockSystem *hessian = nullptr;           // the one last used
@@ -384,8 +384,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
 
   Fill fill() const { return D == 2 || shapes.size() <= FEW ? Fill::COMPLETE : Fill::NONE; }
 
-  template <class S>
-  LandscapeSums sums_of(const PairSums<D, S> &sums, const Displacement &at) const
+  template <class S> LandscapeSums sums_of(const PairSums<D, S> &sums, const Displacement &at) const
   {
     S trace = 0.0;
     for (int k = 0; k < D; ++k) trace += sums.virial[(D + 1) * k];
@@ -766,8 +765,8 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     }
   }
 
-  /// The block system, with blocks of displacements alone if nothing can rotate. One without fill-in
-  /// is made in no time, so that it leaves out the pairs that do not touch.
+  /// The block system, with blocks of displacements alone if nothing can rotate. One without
+  /// fill-in is made in no time, so that it leaves out the pairs that do not touch.
   std::unique_ptr<BlockSystem> block_system(const Moved &posed, Fill with) const
   {
     std::vector<char> used(posed.size(), 1);
@@ -843,9 +842,8 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
       } else {
         const ContactOf<Model, D> contact = contact_in(posed, p, r, &start);
         if (contact.status != ContactStatus::TOUCHING) continue;
-        found.by.template topLeftCorner<D, D>() =
-            Eigen::Map<const Eigen::Matrix<double, D, D>>(
-                &central_hessian<Model>(contact, r)[0][0]);
+        found.by.template topLeftCorner<D, D>() = Eigen::Map<const Eigen::Matrix<double, D, D>>(
+            &central_hessian<Model>(contact, r)[0][0]);
       }
       then(found);
     }

@@ -65,8 +65,8 @@ template <class Model, int D> class MovedPairs : public BodyPairs<Model, D, doub
   MovedPairs(const std::vector<Shape> &particle_shapes, const NearPairs &list,
              const Laws<typename Model::Law> &contact_laws,
              std::function<InLong(std::size_t)> exact_pair) :
-      Base(particle_shapes, list.list(), contact_laws),
-      exact(std::move(exact_pair)), shift(particle_shapes.size()),
+      Base(particle_shapes, list.list(), contact_laws), exact(std::move(exact_pair)),
+      shift(particle_shapes.size()),
       orientation(particle_shapes.size(), Quaternion{1.0, 0.0, 0.0, 0.0})
   {
     const PosedPairs<Model, D, double> posed(particle_shapes, list.then.view(0.0), list.list(),

@@ -71,8 +71,8 @@ using StartIn =
 /// Particles as bodies at the origin, their pairs and laws, in the scalar S. Derived classes pose
 /// the bodies, and have the members `separation(p)`, x_i - x_j; `may_touch(p, r)`, whether the
 /// bounding spheres of a pair of this separation touch, which excludes most pairs of a list at a
-/// tenth of the cost of a contact; `turned(n, first)`, a body rotated by its rotation variables; and
-/// `pair_in_long(p)`, the same pair in long doubles.
+/// tenth of the cost of a contact; `turned(n, first)`, a body rotated by its rotation variables;
+/// and `pair_in_long(p)`, the same pair in long doubles.
 template <class ModelOf, int DIMENSION, class Scalar> class BodyPairs {
  public:
   using Model = ModelOf;
@@ -294,9 +294,8 @@ template <class Pairs> class TurnedBodies {
   }
 
   /// The contact of a pair of this separation, starting from its previous one if given.
-  ContactOf<Model, D, Dual<PAIR_VARIABLES<D>, S>> contact(std::size_t p, const Vec<D, S> &r,
-                                                          typename Pairs::Start *start
-                                                          = nullptr) const
+  ContactOf<Model, D, Dual<PAIR_VARIABLES<D>, S>>
+  contact(std::size_t p, const Vec<D, S> &r, typename Pairs::Start *start = nullptr) const
   {
     auto body_i = as_i[pairs.first(p)];
     body_i.centre = as_variables<D, S>(r);
