@@ -15,6 +15,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stdexcept>
 #include <vector>
 
 namespace jamshape {
@@ -400,6 +401,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   /// The pairs at a point, in doubles.
   const Moved &moved_to(const Displacement &at) const
   {
+    if (!moved) throw std::runtime_error("There are no pairs, expected some that hold here.");
     last = at;
     exact.reset();
     moved->strain = at.strain;
