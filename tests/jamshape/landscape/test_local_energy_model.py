@@ -6,9 +6,11 @@ from scenes import pressed
 from squeezed import squeezed
 from superellipsoid_packings import pressed_superellipsoids
 
+from jamshape import _contact
 from jamshape.contacts import find_contacts
 from jamshape.landscape import CrossingError, Landscape, State
 from jamshape.landscape.local_energy_model import LocalEnergyModel
+from jamshape.minima import Stop, minimise
 from jamshape.minima.descent import rounding_of_a_bond
 from jamshape.packing import body_axes
 from jamshape.protocols.random_start import random_packing
@@ -107,6 +109,19 @@ def test_doubles_lose_no_digits_to_the_size_of_the_box(packing):
     if packing.shape_style == "superellipsoid":  # by iteration
         rounding *= 100
     assert found.gradient == pytest.approx(exact.gradient, rel=0, abs=10 * rounding)
+
+
+@pytest.mark.parametrize("name", ["discs", "discs and rods"])
+def test_minimisers_have_the_same_bits_with_every_instruction_set(name, monkeypatch):
+    start, ends = ROUND[name](), []
+    for instructions in _contact.instruction_sets():
+        monkeypatch.setenv("JAMSHAPE_SIMD", instructions)
+        if instructions != "scalar":  # which adds up pairs in another order
+            ends.append(minimise(Landscape(start), State.of(start), stop=Stop(1e-6)))
+    assert len(ends[0].history.evaluations) > 10
+    for other in ends[1:]:
+        assert other.history.evaluations == ends[0].history.evaluations
+        assert (other.state.position == ends[0].state.position).all()
 
 
 def stretch_of(landscape):
