@@ -85,16 +85,17 @@ template <class Model, int D, class S>
 [[gnu::noinline]] nb::dict derivatives_in(const ShapeOf<Model> &of, const PairArrays &arrays)
 {
   const PosedPairs<Model, D, S> pairs = of.template posed<D, S>(arrays);
-  const TurnedBodies<Model, D, S> turned(pairs);
+  const TurnedBodies<PosedPairs<Model, D, S>> turned(pairs);
   std::vector<std::size_t> touching;
   std::vector<ContactDerivatives<Model, D, S>> found;
   for (std::size_t p = 0; p < pairs.size(); ++p) {
-    const ContactOf<Model, D, S> contact = pairs.contact(p, pairs.separation(p));
+    const Vec<D, S> r = pairs.separation(p);
+    const ContactOf<Model, D, S> contact = contact_in(pairs, p, r);
     if (contact.status != ContactStatus::TOUCHING) continue;
     touching.push_back(p);
     found.emplace_back();
     found.back().contact = contact;
-    const auto dual = turned.contact(p);
+    const auto dual = turned.contact(p, r);
     if (dual.status == ContactStatus::TOUCHING) {
       read_uncoupled<D, S, Model::MOST_BONDS>(dual, found.back());
     }

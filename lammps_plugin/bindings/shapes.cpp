@@ -137,7 +137,7 @@ template <class Model, int D, class S>
   std::vector<std::size_t> at;
   std::vector<ContactOf<Model, D, S>> found;
   for (std::size_t p = 0; p < pairs.size(); ++p) {
-    const ContactOf<Model, D, S> contact = pairs.contact(p, pairs.separation(p));
+    const ContactOf<Model, D, S> contact = contact_in(pairs, p, pairs.separation(p));
     if (contact.status == ContactStatus::APART) continue;
     at.push_back(p);
     found.push_back(contact);

@@ -10,11 +10,12 @@ namespace {
 template <class Model, int D, class S>
 [[gnu::noinline]] nb::dict sums_in(const ShapeOf<Model> &of, const PairArrays &arrays)
 {
-  const PairSums<D, S> sums = sum_over(of.template posed<D, S>(arrays));
+  std::vector<PairSums<D, S>> parts;
+  const PairSums<D, S> &sums = sum_over(parts, of.template posed<D, S>(arrays));
   NewArray<double> force({of.n(), D}), torque({of.n(), ROTATIONS<D>});
   for (std::size_t n = 0; n < of.n(); ++n) {
     write_vec(sums.force[n], force.row(n));
-    write_vec(sums.torque[n], torque.row(n));
+    write_vec(sums.torque_on(n), torque.row(n));
   }
   NewArray<double> virial({D, D});
   write_vec(sums.virial, virial.row(0));

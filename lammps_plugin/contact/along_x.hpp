@@ -34,6 +34,9 @@ template <class ShapeAlongX> struct AlongX {
     return Shape{semi_axes[0] - semi_axes[1], semi_axes[1]};
   }
 
+  /// The overlap of two particles that no contact can rotate is 1 - (r/d)^OVERLAP_POWER.
+  static constexpr int OVERLAP_POWER = 1;
+
   /// Particles that no contact can rotate need no orientation.
   template <int D> static bool turns(const Shape &shape) { return shape.half_length > 0.0; }
 

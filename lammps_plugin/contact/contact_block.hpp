@@ -32,10 +32,17 @@ template <int D> struct ContactBlock {
 
   void add(int first, int second, const Vec<D> &r, double stiffness)
   {
+    put(first, second, r, stiffness);
+    ++n;
+  }
+
+  /// Writes what would be pair n, without counting it.
+  void put(int first, int second, const Vec<D> &r, double stiffness)
+  {
     i[n] = first;
     j[n] = second;
     for (int a = 0; a < D; ++a) separation[a][n] = r[a];
-    k_e[n++] = stiffness;
+    k_e[n] = stiffness;
   }
 
   /// Finds the contacts of a shape without shared lanes.

@@ -6,6 +6,7 @@
 #include "contact/math/vec.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace jamshape {
@@ -170,6 +171,27 @@ void read_derivatives(const Contact<D, Dual<PAIR_VARIABLES<D>, S>, BONDS> &dual,
   for (int row = 0; is_coupled && row < N; ++row) {
     for (int col = 0; col < N; ++col) result.curvature[row][col] += part * along[row] * along[col];
   }
+}
+
+/// A square matrix.
+template <int N, class S = double> using Square = std::array<std::array<S, N>, N>;
+
+/// Second derivatives with respect to r of the energy of a touching contact of two particles that
+/// no contact can rotate, in closed form. V depends on |r| alone, through the overlap 1 -
+/// (|r|/d)^m: the bonds' stiffness along n = r/|r|, and from the force F a curvature -F/|r| (1 + (m
+/// - 2) n n).
+template <class Model, int D, class S>
+Square<D, S> central_hessian(const ContactOf<Model, D, S> &contact, const Vec<D, S> &r)
+{
+  const S distance = norm(r), bend = -norm(contact.force) / distance;
+  S along = (Model::OVERLAP_POWER - 2) * bend;
+  for (int b = 0; b < contact.n_bonds; ++b) along += contact.bond[b].own_stiffness;
+  along /= distance * distance;
+  Square<D, S> found;
+  for (int k = 0; k < D; ++k) {
+    for (int l = 0; l < D; ++l) found[k][l] = along * r[k] * r[l] + (k == l ? bend : S(0));
+  }
+  return found;
 }
 
 /// Largest stiffness of coupled bonds in relaxation rates, over their own. The coupling of two

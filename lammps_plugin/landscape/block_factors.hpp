@@ -9,6 +9,7 @@
 #include <Eigen/OrderingMethods>
 #include <Eigen/SparseCore>
 #include <memory>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -81,9 +82,15 @@ struct BlockPattern {
   std::vector<LeftBlock> left;  // ascending within a row
 
  private:
-  /// An order of elimination with little fill-in (approximate minimum degree).
-  static std::vector<int> ordered(std::size_t N, const std::vector<std::int64_t> &pairs)
+  /// An order of elimination with little fill-in (approximate minimum degree), if there will be
+  /// any.
+  std::vector<int> ordered(std::size_t N, const std::vector<std::int64_t> &pairs) const
   {
+    if (fill == Fill::NONE) {
+      std::vector<int> as_they_are(N);
+      std::iota(as_they_are.begin(), as_they_are.end(), 0);
+      return as_they_are;
+    }
     std::vector<Eigen::Triplet<double>> entries;
     for (std::size_t i = 0; i < N; ++i) entries.emplace_back(i, i, 1.0);
     for (std::size_t p = 0; p < pairs.size(); p += 2) {

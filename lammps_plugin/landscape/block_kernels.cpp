@@ -107,7 +107,8 @@ template <> void Square<3>::put(double *block) const
 
 /// Subtracts from a third block the product of a block and another one, whose (k, c) is part[BLOCK
 /// * k + c].
-template <int BLOCK> void take_product(const double *a, const double *part, double *from)
+template <int BLOCK>
+[[gnu::always_inline]] inline void take_product(const double *a, const double *part, double *from)
 {
   Square<BLOCK> left, rest;
   left.load(a);
@@ -118,8 +119,16 @@ template <int BLOCK> void take_product(const double *a, const double *part, doub
   rest.put(from);
 }
 
+template <int BLOCK> bool is_zero(const double *block)
+{
+  bool found = true;
+  for (int k = 0; k < BLOCK * BLOCK; ++k) found &= block[k] == 0.0;
+  return found;
+}
+
 /// Subtracts from a column the contributions of the eliminated ones on its left (left-looking),
-/// except for blocks outside the pattern.
+/// except for blocks outside the pattern, and for blocks of zeros, which pairs that do not touch
+/// leave behind.
 template <int BLOCK> void gather(const BlockView &at, int j)
 {
   constexpr int SIZE = BLOCK * BLOCK;
@@ -129,6 +138,7 @@ template <int BLOCK> void gather(const BlockView &at, int j)
   }
   for (int k = at.first_left[j]; k < at.first_left[j + 1]; ++k) {
     const int column = at.left[k].column, own = at.left[k].block;
+    if (is_zero<BLOCK>(at.below + SIZE * own)) continue;
     double part[SIZE];
     for (int c = 0; c < BLOCK; ++c) {
       const double pivot = at.diagonal[SIZE * column + (BLOCK + 1) * c];
@@ -253,7 +263,42 @@ template <int BLOCK> void multiply(const BlockView &at, const double *x, double 
   }
 }
 
+using FourSingle = float __attribute__((vector_size(16)));
+
+Four in_doubles(const float *from)
+{
+  FourSingle v;
+  std::memcpy(&v, from, sizeof(v));
+  return __builtin_convertvector(v, Four);
+}
+
+double add_and_dot(int n, double by, const float *vector, const float *further, double *x)
+{
+  constexpr int SUMS = 4;  // in turns, since each addition waits for the one before
+  Four sum[SUMS]{};
+  int k = 0;
+  for (; k + 4 * SUMS <= n; k += 4 * SUMS) {
+    for (int m = 0; m < SUMS; ++m) {
+      Four own;
+      std::memcpy(&own, x + k + 4 * m, sizeof(own));
+      own += by * in_doubles(vector + k + 4 * m);
+      std::memcpy(x + k + 4 * m, &own, sizeof(own));
+      sum[m] += own * in_doubles(further + k + 4 * m);
+    }
+  }
+  double rest = 0.0;
+  for (; k < n; ++k) {
+    x[k] += by * vector[k];
+    rest += x[k] * further[k];
+  }
+  const Four all = (sum[0] + sum[1]) + (sum[2] + sum[3]);
+  return ((all[0] + all[1]) + (all[2] + all[3])) + rest;
+}
+
 }  // namespace
+
+template <InstructionSet SET> AddAndDot add_and_dot_of() { return &add_and_dot; }
+template AddAndDot add_and_dot_of<InstructionSet::JAMSHAPE_SET>();
 
 template <InstructionSet SET, int BLOCK> BlockKernels block_kernels_of()
 {

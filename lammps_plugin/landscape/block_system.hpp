@@ -21,6 +21,9 @@ class BlockSystem {
   /// Adds the second derivatives of a pair with respect to the coordinates of its first and its
   /// second particle, a square matrix in columns.
   virtual void add(std::size_t pair, const double *by) = 0;
+  /// Adds those with respect to the displacement of the first particle relative to the second,
+  /// (D, D), of a pair without rotations.
+  virtual void add_shifts(std::size_t pair, const double *by) = 0;
   virtual Eigen::VectorXd diagonal() const = 0;
   virtual Eigen::VectorXd times(const Eigen::Ref<const Eigen::VectorXd> &vector) const = 0;
   /// Factors of the matrix plus a diagonal (n,); null if a pivot is not positive.
@@ -30,10 +33,12 @@ class BlockSystem {
 };
 
 /// Layout of a block system: N particles, whose at most `most` coordinates have the numbers column
-/// (N, most), -1 for none, and pairs of them (M, 2).
+/// (N, most), -1 for none, and pairs of them (M, 2), of which only those are added that are `used`
+/// (M,).
 struct BlockPlan {
   const std::vector<std::int64_t> &column;
   const std::vector<std::int64_t> &pairs;
+  const std::vector<char> &used;
   std::size_t N;
   int most;
   Fill fill;
@@ -86,7 +91,7 @@ template <int BLOCK> class IteratedFactors : public Factors {
 };
 
 /// Block system of particles with only their first BLOCK coordinates.
-template <int BLOCK> class BlockSystemOf : public BlockSystem {
+template <int BLOCK, int D> class BlockSystemOf : public BlockSystem {
  public:
   explicit BlockSystemOf(const BlockPlan &plan) : most(plan.most), pairs(plan.pairs)
   {
@@ -95,10 +100,14 @@ template <int BLOCK> class BlockSystemOf : public BlockSystem {
       const auto first = plan.column.begin() + i * most;
       column.insert(column.end(), first, first + BLOCK);
     }
-    pattern = std::make_shared<BlockPattern>(std::move(column), pairs, plan.N, plan.fill);
+    std::vector<std::int64_t> coupled;
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+      if (plan.used[k / 2]) coupled.push_back(pairs[k]);
+    }
+    pattern = std::make_shared<BlockPattern>(std::move(column), coupled, plan.N, plan.fill);
     for (std::size_t p = 0; p < pairs.size() / 2; ++p) {
       const int i = place(p, 0), j = place(p, 1);
-      block.push_back(pattern->find(std::min(i, j), std::max(i, j)));
+      block.push_back(plan.used[p] ? pattern->find(std::min(i, j), std::max(i, j)) : -1);
     }
   }
 
@@ -126,6 +135,16 @@ template <int BLOCK> class BlockSystemOf : public BlockSystem {
     } else {
       hessian.below[block[p]] += i > j ? part(0, 1) : part(1, 0);
     }
+  }
+
+  void add_shifts(std::size_t p, const double *by) override
+  {
+    const Eigen::Map<const Eigen::Matrix<double, D, D>> own(by);
+    const int i = place(p, 0), j = place(p, 1);
+    if (i == j) return;  // a particle and its own image move together
+    hessian.diagonal[i].template topLeftCorner<D, D>() += own;
+    hessian.diagonal[j].template topLeftCorner<D, D>() += own;
+    hessian.below[block[p]].template topLeftCorner<D, D>() -= own;
   }
 
   Eigen::VectorXd diagonal() const override
@@ -180,7 +199,7 @@ template <int BLOCK> class BlockSystemOf : public BlockSystem {
   int most;
   std::vector<std::int64_t> pairs;
   std::shared_ptr<const BlockPattern> pattern;
-  std::vector<int> block;  // (M,) block of each pair below the diagonal
+  std::vector<int> block;  // (M,) block of each used pair below the diagonal
   BlockMatrix<BLOCK> hessian;
   std::vector<std::shared_ptr<BlockFactors<BLOCK>>> made;
   BlockKernels kernels = block_kernels<BLOCK>();

@@ -165,7 +165,7 @@ class Descent {
   /// Factor of this shift if a pivot is not positive.
   static constexpr double STIFFEN = 3.0;
   /// Steps of L-BFGS after which the factors are recomputed.
-  static constexpr int REFRESH = 30;
+  static constexpr int REFRESH = 60;
 
   /// Rounding above which extended precision takes over, over the residual and over the tolerance.
   static constexpr double OF_RESIDUAL = 0.01, OF_TOLERANCE = 0.1;
@@ -268,11 +268,12 @@ class Descent {
     return about.part_within(step.data(), stop.step) * step;
   }
 
-  /// Takes a matrix near the Hessian as the initial one of L-BFGS.
+  /// Takes a matrix near the Hessian as the initial one of L-BFGS. Its shift makes factors without
+  /// fill-in nearly as good as complete ones, at a fraction of the price.
   void precondition()
   {
     const Vector origin = Vector::Zero(static_cast<Eigen::Index>(about.n()));
-    about.differentiate({origin.data(), 0.0});
+    about.differentiate({origin.data(), 0.0}, Fill::NONE);
     Vector shift = SOFT * about.largest_of_kind();
     // The error of incomplete factors is of the same size for all coordinates.
     if (!about.has_complete_factors()) shift.setConstant(shift.maxCoeff());

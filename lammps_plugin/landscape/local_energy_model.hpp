@@ -3,6 +3,7 @@
 #include "contact/pair_derivatives.hpp"
 
 #include "landscape/block_system.hpp"
+#include "landscape/near_pairs.hpp"
 #include "packing/pair_sum.hpp"
 
 #include <algorithm>
@@ -12,31 +13,12 @@
 #include <cstdint>
 #include <Eigen/Core>
 #include <memory>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
 #include <vector>
 
 namespace jamshape {
-
-/// Poses of N particles and the box, in double-double: [0] the doubles, [1] the low parts.
-struct Poses {
-  using Numbers = std::vector<double>[2];
-  Numbers position;     // (N, D)
-  Numbers orientation;  // (N,) angles in the plane, (N, 4) quaternions in space
-  Numbers cell;         // (D, D) cell vectors as columns, upper triangular
-
-  static Split get(const Numbers &of, std::size_t k) { return {of[0][k], of[1][k]}; }
-  static void set(Numbers &of, std::size_t k, const Split &to)
-  {
-    of[0][k] = to.value;
-    of[1][k] = to.rest;
-  }
-
-  /// A view to be strained.
-  SplitPoses view(double strain) const
-  {
-    const auto parts = [](const Numbers &of) { return std::array{of[0].data(), of[1].data()}; };
-    return {parts(position), parts(orientation), parts(cell), strain};
-  }
-};
 
 /// Layout of the coordinates: column (N, D + rotations), -1 for none; rotations are measured as
 /// lengths, and move a surface by at most the turning radius per radian.
@@ -44,18 +26,6 @@ struct Coordinates {
   std::size_t n;
   std::vector<std::int64_t> column;
   std::vector<double> radians_per_length, turning_radius;
-};
-
-/// Pairs whose surfaces were closer than `skin` at some poses, and centres closer than `reach`.
-struct NearPairs {
-  std::vector<std::int64_t> particles, shift;  // (M, 2), (M, D)
-  Poses then;
-  double skin, reach;
-  // Motion from `then` to the base, apart from the box's strain: (N, D) displacements, and (N,)
-  // angles, in 3D (N, 4) quaternions.
-  std::vector<double> moved{}, turned{};
-
-  PairList list() const { return {particles.size() / 2, particles.data(), shift.data()}; }
 };
 
 /// A point near the base: a displacement, then an affine strain of box and positions.
@@ -137,9 +107,10 @@ class LocalEnergyModel {
   /// (n,).
   virtual double largest_part(const double *vector) const = 0;
 
-  /// Computes second derivatives with respect to the base's coordinates, for the functions below.
-  /// In 3D at points without rotations. Crossing spines contribute nothing.
-  virtual void differentiate(const Displacement &at) = 0;
+  /// Computes second derivatives with respect to the base's coordinates, for the functions below,
+  /// whose factors will have at most this fill-in. In 3D at points without rotations. Crossing
+  /// spines contribute nothing.
+  virtual void differentiate(const Displacement &at, Fill most) = 0;
   /// (n,) derivative of the gradient with respect to the strain, at that point.
   virtual const Eigen::VectorXd &coupling() const = 0;
   /// Second derivative of the energy with respect to the strain, at that point.
@@ -151,7 +122,7 @@ class LocalEnergyModel {
   /// (n,) for displacements the largest of their diagonal elements, for rotations that of theirs:
   /// nearly round particles rotate far more easily than they move.
   virtual Eigen::VectorXd largest_of_kind() const = 0;
-  /// Whether `factors` are those of the Hessian, or of an approximation.
+  /// Whether `factors` can be those of the Hessian, or only of an approximation.
   virtual bool has_complete_factors() const = 0;
   /// Factors of that Hessian plus a diagonal (n,); null if a pivot is not positive.
   virtual std::shared_ptr<Factors> factors(const Eigen::VectorXd &diagonal) = 0;
@@ -160,7 +131,7 @@ class LocalEnergyModel {
   /// null for non-finite matrices.
   std::shared_ptr<Factors> factorise(const Displacement &at, const Eigen::VectorXd &added)
   {
-    differentiate(at);
+    differentiate(at, Fill::COMPLETE);
     const Eigen::VectorXd sum = diagonal() + added;
     if (!sum.allFinite()) return nullptr;
     const double smallest = sum.size() > 0 ? sum.minCoeff() : 1.0;
@@ -197,14 +168,14 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   void move_to(const Poses &poses) override
   {
     base = poses;
-    if (has_pairs()) measure(pairs);
+    if (has_pairs()) measure_pairs();
   }
 
   void move(const Displacement &at) override
   {
     displace(base, at);
     settle(base, at.strain);
-    if (has_pairs()) measure(pairs);
+    if (has_pairs()) measure_pairs();
   }
 
   void hold() override { held = base; }
@@ -221,7 +192,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     }
     for (int column = 0; column < D; ++column) map_vector(base.cell, column, D, matrix);
     settle(base, 0.0);
-    if (has_pairs()) measure(pairs);
+    if (has_pairs()) measure_pairs();
   }
 
   void take(NearPairs wider, double smaller_skin) override
@@ -253,7 +224,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   void follow_bodies() override
   {
     along_bodies = true;
-    hessian = nullptr;
+    forget_systems();
   }
 
   void strain_along(const std::vector<double> &axes_of_strain) override
@@ -268,19 +239,26 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
 
   LandscapeSums evaluate(const Displacement &at, bool extended) const override
   {
-    return extended ? sums<long double>(at) : sums<double>(at);
+    Team *const by = team_for(pairs.list().n);
+    if (!extended) {
+      return sums_of(sum_over(parts, moved_to(at), remembers ? starts.data() : nullptr, by), at);
+    }
+    std::vector<PairSums<D, long double>> in_long;
+    return sums_of(sum_over(in_long, posed_at<long double>(pairs, at), nullptr, by), at);
   }
 
   double part_within(const double *step, const StepBounds &bounds) const override
   {
     const Displacement by{step, 0.0};
-    double excess = 1.0;
+    double farthest_sq = 0.0, excess = 1.0;
     for (std::size_t i = 0; i < shapes.size(); ++i) {
+      farthest_sq = std::max(farthest_sq, norm_sq(shift(by, i)));
+      if (!turns(i)) continue;
       const double widest =
           std::max(bounds.widest, std::min(WIDE, bounds.longest / coordinates.turning_radius[i]));
-      excess = std::max(
-          {excess, norm(shift(by, i)) / bounds.longest, std::abs(angle_of(turn(by, i))) / widest});
+      excess = std::max(excess, std::abs(angle_of(turn(by, i))) / widest);
     }
+    excess = std::max(excess, std::sqrt(farthest_sq) / bounds.longest);
     return 1.0 / excess;
   }
 
@@ -298,15 +276,19 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     return std::sqrt(most);
   }
 
-  void differentiate(const Displacement &at) override
+  void differentiate(const Displacement &at, Fill most) override
   {
-    if (!hessian) hessian = block_system();
-    const PosedPairs<Model, D, double> posed = posed_at<double>(pairs, at);
-    const TurnedBodies<Model, D, double> turned_bodies(posed);
+    const Fill with = most == Fill::COMPLETE ? fill() : most;
+    const Moved &posed = moved_to(at);
+    std::unique_ptr<BlockSystem> &own = systems[with == Fill::COMPLETE];
+    if (!own || with == Fill::NONE) own = block_system(posed, with);
+    hessian = own.get();
     hessian->clear();
     pulled = Eigen::VectorXd::Zero(n());
     pulled_back = 0.0;
     find_axes(at);
+    std::optional<TurnedBodies<Moved>> turned_bodies;
+    if (any_turns()) turned_bodies.emplace(posed);
     Team *const by = team_for(posed.size());
     curved.resize(parts_of(by));
     in_parts(by, posed.size(), [&](std::size_t k, const Range &part) {
@@ -362,6 +344,8 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   using Start = typename Model::template Start<D>;
   using PairMatrix = Eigen::Matrix<double, VARIABLES, VARIABLES>;
   using PairRow = Eigen::Matrix<double, VARIABLES, 1>;
+  using Posed = PosedPairs<Model, D, double>;
+  using Moved = MovedPairs<Model, D>;
 
   /// Largest rotation of nearly round particles in one step, if their surface stays within its
   /// bound.
@@ -378,10 +362,12 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   /// above this multiple of the bond's.
   static constexpr double STIFFEST = 1e4;
 
-  /// A touching pair, and second derivatives with respect to its variables.
+  /// A touching pair, and second derivatives with respect to its variables; of those of particles
+  /// that no contact can rotate only r is set.
   struct Curved {
     std::size_t p;
     Vec<D> r;
+    bool turns;
     PairMatrix by;
   };
 
@@ -397,8 +383,14 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   Laws<Law> laws;
   Poses held;
   Poses base;
-  mutable Poses there;                   // at the last point
-  std::unique_ptr<BlockSystem> hessian;  // none before pairs are known
+  mutable Poses there;                 // at the last point that needed extended precision
+  mutable std::optional<Moved> moved;  // `pairs`, once they are chosen
+  mutable Displacement last{};         // the point of `moved`
+  mutable std::optional<Posed> exact;  // at that point, if any contact needed it
+  mutable std::mutex guard;            // of `exact`
+  mutable std::vector<PairSums<D, double>> parts;  // work space
+  std::unique_ptr<BlockSystem> systems[2];  // without fill-in and with it, once they are used
+  BlockSystem *hessian = nullptr;           // the one last used
   Vec<D> strained = all_axes();
   Eigen::VectorXd pulled;  // by the strain of these axes
   double pulled_back = 0.0;
@@ -409,10 +401,8 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
 
   Fill fill() const { return D == 2 || shapes.size() <= FEW ? Fill::COMPLETE : Fill::NONE; }
 
-  template <class S> LandscapeSums sums(const Displacement &at) const
+  template <class S> LandscapeSums sums_of(const PairSums<D, S> &sums, const Displacement &at) const
   {
-    const PairSums<D, S> sums =
-        sum_over(posed_at<S>(pairs, at), begins<S>(), team_for(pairs.list().n));
     S trace = 0.0;
     for (int k = 0; k < D; ++k) trace += sums.virial[(D + 1) * k];
     return {static_cast<double>(sums.energy),
@@ -439,10 +429,37 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     return found;
   }
 
-  template <class S> StartIn<Model, D, S> *begins() const
+  /// The pairs at a point, in doubles.
+  const Moved &moved_to(const Displacement &at) const
   {
-    if constexpr (std::is_same_v<S, double>) return remembers ? starts.data() : nullptr;
-    return nullptr;
+    if (!moved) throw std::runtime_error("There are no pairs, expected some that hold here.");
+    last = at;
+    exact.reset();
+    moved->strain = at.strain;
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      moved->displace(i, shift_since(pairs, at, i));
+      if (turns(i)) moved->turn(i, orientation_at(at, i));
+    }
+    return *moved;
+  }
+
+  Quaternion orientation_at(const Displacement &at, std::size_t i) const
+  {
+    const double *const now = &base.orientation[0][TURNS * i];
+    if constexpr (D == 2) {
+      const double half = 0.5 * (now[0] + (base.orientation[1][i] + turn(at, i)[0]));
+      return {std::cos(half), 0.0, 0.0, std::sin(half)};
+    } else {
+      return turned(normalized(Quaternion{now[0], now[1], now[2], now[3]}), turn(at, i));
+    }
+  }
+
+  /// One of the pairs at the point of `moved`, in long doubles.
+  PosedPair<Model, D, long double> exactly(std::size_t p) const
+  {
+    const std::lock_guard<std::mutex> lock(guard);
+    if (!exact) exact.emplace(posed_at<double>(pairs, last));
+    return exact->pair_in_long(p);
   }
 
   /// Pairs of a list at a point, valid until another point is evaluated.
@@ -462,7 +479,8 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   {
     Eigen::VectorXd found = Eigen::VectorXd::Zero(n());
     for (std::size_t i = 0; i < shapes.size(); ++i) {
-      const Torque<D, S> turning = about_axes(i, by_turn(turn(at, i), sums.torque[i]));
+      Torque<D, S> turning{};
+      if (turns(i)) turning = about_axes(i, by_turn(turn(at, i), sums.torque[i]));
       for (int k = 0; k < BLOCK; ++k) {
         const std::int64_t c = coordinates.column[BLOCK * i + k];
         if (c < 0) continue;
@@ -500,7 +518,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   template <class S> Torque<D, S> about_axes(std::size_t i, const Torque<D, S> &torque) const
   {
     if constexpr (D == 3) {
-      if (along_bodies && turns(i)) {
+      if (along_bodies) {
         Torque<D, S> found;
         for (int b = 0; b < 3; ++b) found[b] = dot(constants_of<S>(axis_of(i, b)), torque);
         return found;
@@ -526,37 +544,60 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     }
   }
 
-  /// Growth of the box since a list was made: the map from its cell vectors then to those now,
-  /// upper triangular like both.
-  std::array<Vec<D>, D> growth(const NearPairs &list) const
+  /// Strain of the box since a list was made: the map from its cell vectors then to those now,
+  /// upper triangular like both, minus the identity.
+  std::vector<double> strain_since(const NearPairs &list) const
   {
-    const std::vector<double> &now = base.cell[0], &then = list.then.cell[0];
-    std::array<Vec<D>, D> change{};
+    const std::vector<double> &then = list.then.cell[0];
+    std::vector<double> strain(D * D);
     for (int k = 0; k < D; ++k) {
       for (int m = k; m < D; ++m) {
-        double left = now[D * k + m];
-        for (int l = k; l < m; ++l) left -= change[k][l] * then[D * l + m];
-        change[k][m] = left / then[D * m + m];
+        double left = rounded(joined(since(base.cell, list.then.cell, D * k + m)));
+        for (int l = k; l < m; ++l) left -= strain[D * k + l] * then[D * l + m];
+        strain[D * k + m] = left / then[D * m + m];
       }
     }
-    return change;
+    return strain;
+  }
+
+  /// Change of a number.
+  static Split since(const Poses::Numbers &now, const Poses::Numbers &then, std::size_t k)
+  {
+    return difference(Poses::get(now, k), Poses::get(then, k));
+  }
+
+  void measure_pairs()
+  {
+    measure(pairs);
+    moved->strain_by(pairs.strain);
   }
 
   void measure(NearPairs &list) const
   {
     list.moved.resize(D * shapes.size());
     list.turned.resize(TURNS * shapes.size());
-    const auto change = growth(list);
+    list.strain = strain_since(list);
     for (std::size_t c = 0; c < list.moved.size(); ++c) {
-      const std::size_t k = c % D;
-      double affine = change[k][k] * list.then.position[0][c];
-      for (std::size_t m = k + 1; m < D; ++m) {
-        affine += change[k][m] * list.then.position[0][c - k + m];
-      }
-      list.moved[c] = base.position[0][c] - affine;
+      const Split change = since(base.position, list.then.position, c);
+      list.moved[c] = change.value + change.rest;
     }
+    const auto is_zero = [](double x) { return x == 0.0; };
+    if (!std::all_of(list.strain.begin(), list.strain.end(), is_zero)) subtract_strain(list);
     for (std::size_t i = 0; i < shapes.size(); ++i) {
       if (turns(i)) measure_turn(list, i);
+    }
+  }
+
+  /// Subtracts the displacements with the box, in long doubles: they grow with its size.
+  void subtract_strain(NearPairs &list) const
+  {
+    for (std::size_t c = 0; c < list.moved.size(); ++c) {
+      const std::size_t k = c % D;
+      long double own = joined(since(base.position, list.then.position, c));
+      for (std::size_t m = k; m < D; ++m) {
+        own -= list.strain[D * k + m] * joined(Poses::get(list.then.position, c - k + m));
+      }
+      list.moved[c] = rounded(own);
     }
   }
 
@@ -594,15 +635,15 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   static double angle_of(const Vec<1> &turn) { return turn[0]; }
   static double angle_of(const Vec<3> &turn) { return norm(turn); }
 
-  /// Bound of the relative change of a vector by the box's growth and then by a stretch.
-  double box_strain(const NearPairs &list, double stretch) const
+  /// Bound of the relative change of a vector by the box's strain and then by a stretch.
+  static double box_strain(const NearPairs &list, double stretch)
   {
-    const auto change = growth(list);
     double scaled = 0.0, sheared_sq = 0.0;
     for (int k = 0; k < D; ++k) {
-      scaled = std::max(scaled, std::abs(stretch * change[k][k] - 1.0));
+      scaled = std::max(scaled, std::abs(stretch * (1.0 + list.strain[(D + 1) * k]) - 1.0));
       for (int m = k + 1; m < D; ++m) {
-        sheared_sq += stretch * change[k][m] * stretch * change[k][m];
+        const double sheared = stretch * list.strain[D * k + m];
+        sheared_sq += sheared * sheared;
       }
     }
     return scaled + std::sqrt(sheared_sq);
@@ -611,15 +652,27 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   /// Whether the gap of two surfaces may have shrunk by the skin, or by what remains of it.
   bool is_beyond(const NearPairs &list, const Displacement &at, double kept = 0.0) const
   {
-    double most = 0.0;
-    const double stretch = 1.0 + at.strain, scaled = box_strain(list, stretch);
+    double most = 0.0, most_sq = 0.0;
+    const double stretch = 1.0 + at.strain;
     for (std::size_t i = 0; i < shapes.size(); ++i) {
-      Vec<D> by = shift(at, i);
-      for (int k = 0; k < D; ++k) by[k] += list.moved[D * i + k];
-      const double turned = turns(i) ? coordinates.turning_radius[i] * turned_to(list, at, i) : 0.0;
-      most = std::max(most, stretch * norm(by) + turned);
+      const Vec<D> by = shift_since(list, at, i);
+      if (turns(i)) {
+        const double turned = coordinates.turning_radius[i] * turned_to(list, at, i);
+        most = std::max(most, stretch * norm(by) + turned);
+      } else {
+        most_sq = std::max(most_sq, norm_sq(by));
+      }
     }
-    return 2.0 * most >= list.skin - kept - scaled * list.reach;
+    most = std::max(most, stretch * std::sqrt(most_sq));
+    return 2.0 * most >= list.skin - kept - box_strain(list, stretch) * list.reach;
+  }
+
+  /// Displacement of a particle at a point since a list was made, apart from the box's strain.
+  Vec<D> shift_since(const NearPairs &list, const Displacement &at, std::size_t i) const
+  {
+    Vec<D> by = shift(at, i);
+    for (int k = 0; k < D; ++k) by[k] += list.moved[D * i + k];
+    return by;
   }
 
   /// Chooses the wide pairs that are within the smaller skin at a point.
@@ -636,9 +689,16 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     }
     pairs.then = there;
     settle(pairs.then, at.strain);
-    measure(pairs);
+    moved.emplace(shapes, pairs, laws, [this](std::size_t p) { return exactly(p); });
+    measure_pairs();
     starts.assign(pairs.list().n, {});
+    forget_systems();
+  }
+
+  void forget_systems()
+  {
     hessian = nullptr;
+    for (auto &one : systems) one = nullptr;
   }
 
   template <class Then> void each_coordinate(const Then &then) const
@@ -738,12 +798,17 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     }
   }
 
-  /// The block system, with blocks of displacements alone if nothing can rotate.
-  std::unique_ptr<BlockSystem> block_system() const
+  /// The block system, with blocks of displacements alone if nothing can rotate. One without
+  /// fill-in is made in no time, so that it leaves out the pairs that do not touch.
+  std::unique_ptr<BlockSystem> block_system(const Moved &posed, Fill with) const
   {
-    const BlockPlan plan{coordinates.column, pairs.particles, shapes.size(), BLOCK, fill()};
-    if (any_turns()) return std::make_unique<BlockSystemOf<BLOCK>>(plan);
-    return std::make_unique<BlockSystemOf<D>>(plan);
+    std::vector<char> used(posed.size(), 1);
+    for (std::size_t p = 0; p < posed.size() && with == Fill::NONE; ++p) {
+      used[p] = posed.may_touch(p, posed.separation(p));
+    }
+    const BlockPlan plan{coordinates.column, pairs.particles, used, shapes.size(), BLOCK, with};
+    if (any_turns()) return std::make_unique<BlockSystemOf<BLOCK, D>>(plan);
+    return std::make_unique<BlockSystemOf<D, D>>(plan);
   }
 
   /// Whether any of the coordinates is a rotation.
@@ -757,22 +822,18 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
 
   /// Second derivatives with respect to the variables of a touching pair; those of rotating faces
   /// in contact are bounded.
-  PairMatrix by_variables(std::size_t p, const ContactOf<Model, D> &contact,
-                          const DualContact &dual) const
+  PairMatrix by_variables(std::size_t p, const DualContact &dual) const
   {
-    SecondDerivatives<D, double, Model::MOST_BONDS> found{};
+    SecondDerivatives<D, double, Model::MOST_BONDS> found;
     read_derivatives(dual, found);
     const PairMatrix turning = Eigen::Map<const PairMatrix>(&found.curvature[0][0]);
     PairMatrix by = PairMatrix::Zero();
     double stiffest = 0.0;
-    for (int b = 0; b < contact.n_bonds; ++b) {
-      const Bond<D> &bond = contact.bond[b];
-      PairRow along;
-      std::copy_n(bond.normal.c, D, along.data());
-      std::copy_n(bond.lever_i.c, ROTATIONS<D>, along.data() + FIRST_OF_I<D>);
-      std::copy_n(bond.lever_j.c, ROTATIONS<D>, along.data() + FIRST_OF_J<D>);
-      by += bond.own_stiffness * along * along.transpose();
-      stiffest += STIFFEST * bond.own_stiffness;
+    for (int b = 0; b < dual.n_bonds; ++b) {
+      const double own = value_of(dual.bond[b].own_stiffness);
+      const Eigen::Map<const PairRow> along(found.gradient[b]);
+      by += own * along * along.transpose();
+      stiffest += STIFFEST * own;
     }
     const PairRow part = per_length(p);
     const double largest = (part.asDiagonal() * turning * part.asDiagonal()).cwiseAbs().maxCoeff();
@@ -799,26 +860,52 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   }
 
   template <class Then>
-  void each_curved(const PosedPairs<Model, D, double> &posed,
-                   const TurnedBodies<Model, D, double> &turned_bodies, const Range &part,
-                   const Then &then) const
+  void each_curved(const Moved &posed, const std::optional<TurnedBodies<Moved>> &turned_bodies,
+                   const Range &part, const Then &then) const
   {
     for (std::size_t p = part.first; p < part.last; ++p) {
       const Vec<D> r = posed.separation(p);
       Start start = remembers ? starts[p] : Start{};
       if (!posed.may_touch(p, r)) continue;
-      const ContactOf<Model, D> contact = posed.contact(p, r, &start);
-      if (contact.status != ContactStatus::TOUCHING) continue;
-      const DualContact dual = turned_bodies.contact(p, &start);
-      if (dual.status == ContactStatus::TOUCHING) {
-        then(Curved{p, r, by_variables(p, contact, dual)});
+      Curved found{p, r, posed.pair_turns(p), {}};
+      if (found.turns) {
+        const DualContact dual = turned_bodies->contact(p, r, &start);
+        if (dual.status != ContactStatus::TOUCHING) continue;
+        found.by = by_variables(p, dual);
+      } else {
+        const ContactOf<Model, D> contact = contact_in(posed, p, r, &start);
+        if (contact.status != ContactStatus::TOUCHING) continue;
+        found.by.template topLeftCorner<D, D>() = Eigen::Map<const Eigen::Matrix<double, D, D>>(
+            &central_hessian<Model>(contact, r)[0][0]);
       }
+      then(found);
+    }
+  }
+
+  /// Adds a pair of particles that no contact can rotate.
+  void add_round(const Curved &pair, double stretch)
+  {
+    const Eigen::Matrix<double, D, D> by =
+        stretch * stretch * pair.by.template topLeftCorner<D, D>();
+    hessian->add_shifts(pair.p, by.data());
+    const Eigen::Map<const Eigen::Matrix<double, D, 1>> r(pair.r.c);
+    add_pull(pair.p, 0, by * r / stretch);
+    add_pull(pair.p, 1, -by * r / stretch);
+  }
+
+  /// Adds the force by which the strain pulls the first or second particle of a pair.
+  template <class Pull> void add_pull(std::size_t p, int side, const Pull &pull)
+  {
+    const std::int64_t *const own = &coordinates.column[BLOCK * pairs.particles[2 * p + side]];
+    for (int k = 0; k < Pull::RowsAtCompileTime; ++k) {
+      if (own[k] >= 0) pulled[own[k]] += pull[k];
     }
   }
 
   void add_pair(const Curved &pair, double stretch)
   {
-    const auto &[p, r, by] = pair;
+    if (!pair.turns) return add_round(pair, stretch);
+    const auto &[p, r, turns, by] = pair;
     double scale[2][BLOCK];
     for (int side = 0; side < 2; ++side) {
       const std::size_t particle = pairs.particles[2 * p + side];
@@ -858,12 +945,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
           (scaled.template middleCols<TURN>(first) * to).eval();
     }
     hessian->add(p, scaled.data());
-    for (int side = 0; side < 2; ++side) {
-      for (int k = 0; k < BLOCK; ++k) {
-        const std::int64_t c = coordinates.column[BLOCK * pairs.particles[2 * p + side] + k];
-        if (c >= 0) pulled[c] += pull[side][k];
-      }
-    }
+    for (int side = 0; side < 2; ++side) add_pull(p, side, pull[side]);
   }
 };
 

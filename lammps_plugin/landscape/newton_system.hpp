@@ -34,7 +34,7 @@ class NewtonSystem {
   void prepare()
   {
     const Vector origin = Vector::Zero(static_cast<Eigen::Index>(about.n()));
-    about.differentiate({origin.data(), 0.0});
+    about.differentiate({origin.data(), 0.0}, Fill::COMPLETE);
     const double largest = about.n() > 0 ? about.diagonal().cwiseAbs().maxCoeff() : 0.0;
     if (!std::isfinite(largest))
       throw std::runtime_error("The Hessian has elements that are not finite.");

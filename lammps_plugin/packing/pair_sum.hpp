@@ -68,24 +68,29 @@ template <class Model, int D, class S>
 using StartIn =
     std::conditional_t<std::is_same_v<S, double>, typename Model::template Start<D>, NoStart>;
 
-/// Pairs of posed particles, in the scalar S. Separations have no rounding errors except that of S
-/// itself.
-template <class Model, int D, class S> class PosedPairs {
+/// Particles as bodies at the origin, their pairs and laws, in the scalar S. Derived classes pose
+/// the bodies, and have the members `separation(p)`, x_i - x_j; `may_touch(p, r)`, whether the
+/// bounding spheres of a pair of this separation touch, which excludes most pairs of a list at a
+/// tenth of the cost of a contact; `turned(n, first)`, a body rotated by its rotation variables;
+/// and `pair_in_long(p)`, the same pair in long doubles.
+template <class ModelOf, int DIMENSION, class Scalar> class BodyPairs {
  public:
-  using Long = long double;
+  using Model = ModelOf;
+  using S = Scalar;
+  static constexpr int D = DIMENSION;
+  using Body = typename Model::template Body<D, S>;
+  using Start = StartIn<Model, D, S>;
 
-  PosedPairs(const std::vector<typename Model::Shape> &particle_shapes, const SplitPoses &at,
-             const PairList &list, const Laws<typename Model::Law> &contact_laws) :
-      shapes(particle_shapes), poses(at), pairs(list), common(contact_laws.any()),
+  BodyPairs(const std::vector<typename Model::Shape> &particle_shapes, const PairList &list,
+            const Laws<typename Model::Law> &contact_laws) :
+      shapes(particle_shapes), pairs(list), common(contact_laws.any()),
       mixed(contact_laws.is_one() ? nullptr : &contact_laws)
   {
     body.reserve(shapes.size());
     around.reserve(shapes.size());
-    for (std::size_t n = 0; n < shapes.size(); ++n) {
-      around.push_back(WIDER * Model::template outer_radius<D>(shapes[n]));
-      body.push_back(Model::template body<D, S>(shapes[n]));
-      if (Model::template turns<D>(shapes[n]))
-        Model::template turn_to<D, S>(body[n], orientation_of(n));
+    for (const typename Model::Shape &shape : shapes) {
+      around.push_back(WIDER * Model::template outer_radius<D>(shape));
+      body.push_back(Model::template body<D, S>(shape));
     }
   }
 
@@ -101,6 +106,59 @@ template <class Model, int D, class S> class PosedPairs {
   std::size_t first(std::size_t p) const { return pairs.particles[2 * p]; }
   std::size_t second(std::size_t p) const { return pairs.particles[2 * p + 1]; }
 
+  /// The bodies of a pair of this separation, the second at the origin.
+  Body first_body(std::size_t p, const Vec<D, S> &r) const
+  {
+    Body body_i = body[first(p)];
+    body_i.centre = r;
+    return body_i;
+  }
+  const Body &second_body(std::size_t p) const { return body[second(p)]; }
+
+  /// Whether packs support all of these particles.
+  bool packs_take_all() const
+  {
+    return std::all_of(shapes.begin(), shapes.end(), [&](const typename Model::Shape &shape) {
+      return PacksOf<Model, D>::take(shape, shapes.front());
+    });
+  }
+
+  /// All bodies, at the origin.
+  const Body *bodies() const { return body.data(); }
+
+  /// Whether contacts can rotate a particle, or either of a pair.
+  bool turns(std::size_t n) const { return Model::template turns<D>(shapes[n]); }
+  bool pair_turns(std::size_t p) const { return turns(first(p)) || turns(second(p)); }
+
+ protected:
+  /// Margin that prevents rounding from hiding a contact of tips.
+  static constexpr double WIDER = 1.0 + 1e-14;
+
+  const std::vector<typename Model::Shape> &shapes;
+  PairList pairs;
+  typename Model::Law common;
+  const Laws<typename Model::Law> *mixed;  // null if one law is that of all pairs
+  std::vector<Body> body;                  // at the origin
+  std::vector<double> around;              // radii of the bounding spheres
+};
+
+/// Pairs of posed particles. Separations have no rounding errors except that of S itself.
+template <class Model, int D, class S> class PosedPairs : public BodyPairs<Model, D, S> {
+ public:
+  using Long = long double;
+  using Base = BodyPairs<Model, D, S>;
+  using Base::first;
+  using Base::second;
+
+  PosedPairs(const std::vector<typename Model::Shape> &particle_shapes, const SplitPoses &at,
+             const PairList &list, const Laws<typename Model::Law> &contact_laws) :
+      Base(particle_shapes, list, contact_laws), poses(at)
+  {
+    for (std::size_t n = 0; n < shapes.size(); ++n) {
+      if (this->turns(n)) Model::template turn_to<D, S>(this->body[n], orientation_of(n));
+    }
+  }
+
   /// x_i - x_j.
   Vec<D, S> separation(std::size_t p) const { return separation_in<S>(p); }
 
@@ -112,7 +170,7 @@ template <class Model, int D, class S> class PosedPairs {
       apart[k] = difference(at(poses.position, D * i + k), at(poses.position, D * j + k));
     }
     for (int m = 0; m < D; ++m) {
-      const std::int64_t turns = pairs.shift[D * p + m];
+      const std::int64_t turns = this->pairs.shift[D * p + m];
       if (turns != 0) move_along(m, static_cast<double>(turns), apart);
     }
     Vec<D, T> r;
@@ -120,43 +178,10 @@ template <class Model, int D, class S> class PosedPairs {
     return r;
   }
 
-  /// Whether the bounding spheres of a pair of this separation touch: this excludes most pairs of a
-  /// list at a tenth of the cost of a contact.
   bool may_touch(std::size_t p, const Vec<D, S> &r) const
   {
-    const double reach = around[first(p)] + around[second(p)];
+    const double reach = this->around[first(p)] + this->around[second(p)];
     return norm_sq(r) < S(reach) * reach;
-  }
-
-  /// The bodies of a pair of this separation, the second at the origin.
-  typename Model::template Body<D, S> first_body(std::size_t p, const Vec<D, S> &r) const
-  {
-    auto body_i = body[first(p)];
-    body_i.centre = r;
-    return body_i;
-  }
-  const typename Model::template Body<D, S> &second_body(std::size_t p) const
-  {
-    return body[second(p)];
-  }
-
-  /// The contact of a pair of this separation, starting from its previous one if given.
-  ContactOf<Model, D, S> contact(std::size_t p, const Vec<D, S> &r,
-                                 StartIn<Model, D, S> *start = nullptr) const
-  {
-    const auto found = detail::contact_begun(first_body(p, r), second_body(p), law(p), start);
-    return to_its_digits(p, found);
-  }
-
-  /// A contact of a pair, in plain or in dual numbers, in long doubles where S is not precise
-  /// enough.
-  template <class Found> Found to_its_digits(std::size_t p, const Found &found) const
-  {
-    if constexpr (std::is_same_v<S, double>) {
-      return jamshape::to_its_digits<Model, D>(found, [&] { return pair_in_long(p); });
-    } else {
-      return found;
-    }
   }
 
   /// The reference for errors of a contact.
@@ -168,30 +193,20 @@ template <class Model, int D, class S> class PosedPairs {
             separation_in<Long>(p),
             orientation_in<Long>(i),
             orientation_in<Long>(j),
-            law(p)};
+            this->law(p)};
   }
-
-  /// Whether packs support all of these particles.
-  bool packs_take_all() const
-  {
-    return std::all_of(shapes.begin(), shapes.end(), [&](const typename Model::Shape &shape) {
-      return PacksOf<Model, D>::take(shape, shapes.front());
-    });
-  }
-
-  /// All bodies, at the origin.
-  const typename Model::template Body<D, S> *bodies() const { return body.data(); }
 
   /// Whether the gap between two surfaces may be smaller than a margin.
   bool are_closer(std::size_t p, double margin) const
   {
-    return Model::template closer_than<D>(margin, first_body(p, separation(p)), second_body(p));
+    return Model::template closer_than<D>(margin, this->first_body(p, separation(p)),
+                                          this->second_body(p));
   }
 
   /// Whether the particles share more than a point.
   bool overlap(std::size_t p) const
   {
-    return are_overlapping(first_body(p, separation(p)), second_body(p));
+    return are_overlapping(this->first_body(p, separation(p)), this->second_body(p));
   }
 
   /// A body rotated by its rotation variables, from `first` on.
@@ -201,16 +216,8 @@ template <class Model, int D, class S> class PosedPairs {
   }
 
  private:
-  /// Margin that prevents rounding from hiding a contact of tips.
-  static constexpr double WIDER = 1.0 + 1e-14;
-
-  const std::vector<typename Model::Shape> &shapes;
+  using Base::shapes;
   SplitPoses poses;
-  PairList pairs;
-  typename Model::Law common;
-  const Laws<typename Model::Law> *mixed;                 // null if one law is that of all pairs
-  std::vector<typename Model::template Body<D, S>> body;  // at the origin
-  std::vector<double> around;                             // radii of the bounding spheres
 
   /// Shifts the second particle of a pair by a number of one of the cell vectors; zero for most
   /// pairs.
@@ -246,11 +253,37 @@ template <class Model, int D, class S> class PosedPairs {
   }
 };
 
-/// The bodies of posed pairs in dual numbers, each once as the first and once as the second of a
-/// pair.
-template <class Model, int D, class S> class TurnedBodies {
+/// A contact of a pair, in plain or in dual numbers, in long doubles where S is not precise enough.
+template <class Pairs, class Found>
+Found to_its_digits(const Pairs &pairs, std::size_t p, const Found &found)
+{
+  if constexpr (std::is_same_v<typename Pairs::S, double>) {
+    return to_its_digits<typename Pairs::Model, Pairs::D>(found,
+                                                          [&] { return pairs.pair_in_long(p); });
+  } else {
+    return found;
+  }
+}
+
+/// The contact of a pair of this separation, starting from its previous one if given.
+template <class Pairs>
+ContactOf<typename Pairs::Model, Pairs::D, typename Pairs::S>
+contact_in(const Pairs &pairs, std::size_t p, const Vec<Pairs::D, typename Pairs::S> &r,
+           typename Pairs::Start *start = nullptr)
+{
+  const auto found =
+      detail::contact_begun(pairs.first_body(p, r), pairs.second_body(p), pairs.law(p), start);
+  return to_its_digits(pairs, p, found);
+}
+
+/// The bodies of pairs in dual numbers, each once as the first and once as the second of a pair.
+template <class Pairs> class TurnedBodies {
  public:
-  explicit TurnedBodies(const PosedPairs<Model, D, S> &posed) : pairs(posed)
+  using Model = typename Pairs::Model;
+  using S = typename Pairs::S;
+  static constexpr int D = Pairs::D;
+
+  explicit TurnedBodies(const Pairs &posed) : pairs(posed)
   {
     as_i.reserve(pairs.n_particles());
     as_j.reserve(pairs.n_particles());
@@ -260,18 +293,18 @@ template <class Model, int D, class S> class TurnedBodies {
     }
   }
 
-  /// The contact of a pair, starting from its previous one if given.
+  /// The contact of a pair of this separation, starting from its previous one if given.
   ContactOf<Model, D, Dual<PAIR_VARIABLES<D>, S>>
-  contact(std::size_t p, StartIn<Model, D, S> *start = nullptr) const
+  contact(std::size_t p, const Vec<D, S> &r, typename Pairs::Start *start = nullptr) const
   {
     auto body_i = as_i[pairs.first(p)];
-    body_i.centre = as_variables<D, S>(pairs.separation(p));
+    body_i.centre = as_variables<D, S>(r);
     const auto found = detail::contact_begun(body_i, as_j[pairs.second(p)], pairs.law(p), start);
-    return pairs.to_its_digits(p, found);
+    return to_its_digits(pairs, p, found);
   }
 
  private:
-  const PosedPairs<Model, D, S> &pairs;
+  const Pairs &pairs;
   std::vector<typename Model::template Body<D, Dual<PAIR_VARIABLES<D>, S>>> as_i, as_j;
 };
 
@@ -286,10 +319,26 @@ template <int D, class S> struct PairSums {
   std::int64_t crossing = -1;     // the first pair of this status, -1 for none
   std::int64_t unconverged = -1;  // likewise
 
+  /// Sets all to zero, of N particles; torques only if contacts can rotate any of them.
+  void clear(std::size_t N, bool any_turns)
+  {
+    energy = bond_force = 0.0;
+    virial = {};
+    n_bonds = 0;
+    crossing = unconverged = -1;
+    force.assign(N, Vec<D, S>{});
+    torque.assign(any_turns ? N : 0, Torque<D, S>{});
+  }
+
+  /// The torque on a particle.
+  Torque<D, S> torque_on(std::size_t n) const
+  {
+    return torque.empty() ? Torque<D, S>{} : torque[n];
+  }
+
   /// The contact of the p-th pair.
-  template <class Model>
-  void add(const PosedPairs<Model, D, S> &pairs, std::size_t p, const Vec<D, S> &r,
-           const ContactOf<Model, D, S> &contact)
+  template <class Pairs, class Found>
+  void add(const Pairs &pairs, std::size_t p, const Vec<D, S> &r, const Found &contact)
   {
     if (contact.status == ContactStatus::APART) return;
     if (contact.status != ContactStatus::TOUCHING) {
@@ -300,8 +349,7 @@ template <int D, class S> struct PairSums {
     }
     energy += contact.energy;
     add_force(pairs.first(p), pairs.second(p), r, contact.force);
-    torque[pairs.first(p)] += contact.torque_i;
-    torque[pairs.second(p)] += contact.torque_j;
+    add_torques(pairs.first(p), pairs.second(p), contact.torque_i, contact.torque_j);
     for (int b = 0; b < contact.n_bonds; ++b) bond_force += norm(contact.bond[b].force);
     n_bonds += contact.n_bonds;
   }
@@ -312,8 +360,7 @@ template <int D, class S> struct PairSums {
     const int i = block.i[k], j = block.j[k];
     energy += block.energy[k];
     add_force(i, j, block.separation_of(k), block.force_of(k));
-    torque[i] += block.torque_i_of(k);
-    torque[j] += block.torque_j_of(k);
+    if (!torque.empty()) add_torques(i, j, block.torque_i_of(k), block.torque_j_of(k));
     bond_force += block.bond_force[k];
     n_bonds += 1 + (block.two_bonds >> k & 1);
   }
@@ -322,10 +369,8 @@ template <int D, class S> struct PairSums {
   void add(const PairSums &next)
   {
     energy += next.energy;
-    for (std::size_t n = 0; n < force.size(); ++n) {
-      force[n] += next.force[n];
-      torque[n] += next.torque[n];
-    }
+    for (std::size_t n = 0; n < force.size(); ++n) force[n] += next.force[n];
+    for (std::size_t n = 0; n < torque.size(); ++n) torque[n] += next.torque[n];
     virial += next.virial;
     bond_force += next.bond_force;
     n_bonds += next.n_bonds;
@@ -334,6 +379,13 @@ template <int D, class S> struct PairSums {
   }
 
  private:
+  void add_torques(std::size_t i, std::size_t j, const Torque<D, S> &on_i, const Torque<D, S> &on_j)
+  {
+    if (torque.empty()) return;
+    torque[i] += on_i;
+    torque[j] += on_j;
+  }
+
   void add_force(std::size_t i, std::size_t j, const Vec<D, S> &r, const Vec<D, S> &on_i)
   {
     force[i] += on_i;
@@ -346,24 +398,22 @@ template <int D, class S> struct PairSums {
 
 /// The function that finds the contacts of these pairs in packs; null if pairs are evaluated one by
 /// one, as without shortcuts.
-template <class Model, int D>
-FindContacts<Model, D> *packs_for(const PosedPairs<Model, D, double> &pairs)
+template <class Pairs> FindContacts<typename Pairs::Model, Pairs::D> *packs_for(const Pairs &pairs)
 {
   if (!pairs.any_law().shortcuts || !pairs.packs_take_all()) return nullptr;
-  return PacksOf<Model, D>::of(required_instruction_set());
+  return PacksOf<typename Pairs::Model, Pairs::D>::of(required_instruction_set());
 }
 
 /// Pairs of a list that may touch, in a block, with the number of each.
-template <class Model, int D> class NumberedBlock {
+template <class Pairs> class NumberedBlock {
  public:
-  using Start = typename Model::template Start<D>;
+  using Model = typename Pairs::Model;
+  using Start = typename Pairs::Start;
+  static constexpr int D = Pairs::D;
   static constexpr bool HAS_START = !std::is_same_v<Start, NoStart>;
 
   /// Contacts start from the previous ones, and store where they end, if `starts` is given.
-  NumberedBlock(const PosedPairs<Model, D, double> &posed, Start *of_pairs) :
-      pairs(posed), starts(of_pairs)
-  {
-  }
+  NumberedBlock(const Pairs &posed, Start *of_pairs) : pairs(posed), starts(of_pairs) {}
 
   bool is_empty() const { return block.n == 0; }
 
@@ -373,13 +423,13 @@ template <class Model, int D> class NumberedBlock {
     std::size_t p = from.first;
     for (block.n = 0; p < from.last && block.n < block.MOST; ++p) {
       const Vec<D> r = pairs.separation(p);
-      if (!pairs.may_touch(p, r)) continue;
       if constexpr (HAS_START) {
         if (starts != nullptr) block.set_start(block.n, starts[p]);
       }
       number[block.n] = p;
-      block.add(static_cast<int>(pairs.first(p)), static_cast<int>(pairs.second(p)), r,
+      block.put(static_cast<int>(pairs.first(p)), static_cast<int>(pairs.second(p)), r,
                 Model::k_e(pairs.law(p)));
+      block.n += pairs.may_touch(p, r);  // a branch would be unpredictable
     }
     return p;
   }
@@ -394,61 +444,55 @@ template <class Model, int D> class NumberedBlock {
     block.for_each(block.alone, [&](int k) {
       const std::size_t p = number[k];
       const Vec<D> r = block.separation_of(k);
-      sums.add(pairs, p, r, pairs.contact(p, r, starts == nullptr ? nullptr : starts + p));
+      sums.add(pairs, p, r, contact_in(pairs, p, r, starts == nullptr ? nullptr : starts + p));
     });
   }
 
  private:
-  const PosedPairs<Model, D, double> &pairs;
+  const Pairs &pairs;
   Start *starts;
   ContactBlock<D> block;
   std::size_t number[ContactBlock<D>::MOST];
 };
 
-/// Adds contacts of a range of pairs, in packs.
-template <class Model, int D>
-void add_blocks(PairSums<D, double> &sums, NumberedBlock<Model, D> &block,
-                FindContacts<Model, D> &find, const Range &part)
-{
-  for (std::size_t p = part.first; p < part.last;) {
-    p = block.fill({p, part.last});
-    if (!block.is_empty()) block.add_to(sums, find);
-  }
-}
-
 /// Sums over a range of pairs. Contacts start from the previous ones of these pairs, if given.
-template <class Model, int D, class S>
-PairSums<D, S> sum_part(const PosedPairs<Model, D, S> &pairs, StartIn<Model, D, S> *starts,
-                        const Range &part)
+template <class Pairs>
+void sum_part(PairSums<Pairs::D, typename Pairs::S> &sums, const Pairs &pairs,
+              typename Pairs::Start *starts, const Range &part)
 {
-  PairSums<D, S> sums;
-  sums.force.assign(pairs.n_particles(), Vec<D, S>{});
-  sums.torque.assign(pairs.n_particles(), Torque<D, S>{});
-  if constexpr (std::is_same_v<S, double> && PacksOf<Model, D>::EXIST) {
+  bool any_turns = false;
+  for (std::size_t n = 0; n < pairs.n_particles() && !any_turns; ++n) any_turns = pairs.turns(n);
+  sums.clear(pairs.n_particles(), any_turns);
+  if constexpr (std::is_same_v<typename Pairs::S, double> &&
+                PacksOf<typename Pairs::Model, Pairs::D>::EXIST) {
     if (auto *const find = packs_for(pairs)) {
-      NumberedBlock<Model, D> block(pairs, starts);
-      add_blocks(sums, block, *find, part);
-      return sums;
+      NumberedBlock<Pairs> block(pairs, starts);
+      for (std::size_t p = part.first; p < part.last;) {
+        p = block.fill({p, part.last});
+        if (!block.is_empty()) block.add_to(sums, *find);
+      }
+      return;
     }
   }
   for (std::size_t p = part.first; p < part.last; ++p) {
-    const Vec<D, S> r = pairs.separation(p);
+    const auto r = pairs.separation(p);
     if (!pairs.may_touch(p, r)) continue;
-    sums.add(pairs, p, r, pairs.contact(p, r, starts == nullptr ? nullptr : starts + p));
+    sums.add(pairs, p, r, contact_in(pairs, p, r, starts == nullptr ? nullptr : starts + p));
   }
-  return sums;
 }
 
-/// Sums over all pairs, by a team if there is one: in parts, added in their order.
-template <class Model, int D, class S>
-PairSums<D, S> sum_over(const PosedPairs<Model, D, S> &pairs,
-                        StartIn<Model, D, S> *starts = nullptr, Team *team = nullptr)
+/// Sums over all pairs, by a team if there is one: in parts, added in their order. `parts` is work
+/// space, kept from call to call; the first of them is the result.
+template <class Pairs>
+const PairSums<Pairs::D, typename Pairs::S> &
+sum_over(std::vector<PairSums<Pairs::D, typename Pairs::S>> &parts, const Pairs &pairs,
+         typename Pairs::Start *starts = nullptr, Team *team = nullptr)
 {
-  std::vector<PairSums<D, S>> sums(parts_of(team));
+  parts.resize(parts_of(team));
   in_parts(team, pairs.size(),
-           [&](std::size_t k, const Range &part) { sums[k] = sum_part(pairs, starts, part); });
-  for (std::size_t k = 1; k < sums.size(); ++k) sums[0].add(sums[k]);
-  return std::move(sums[0]);
+           [&](std::size_t k, const Range &part) { sum_part(parts[k], pairs, starts, part); });
+  for (std::size_t k = 1; k < parts.size(); ++k) parts[0].add(parts[k]);
+  return parts[0];
 }
 
 }  // namespace jamshape

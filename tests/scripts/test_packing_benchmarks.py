@@ -1,4 +1,4 @@
-"""analysis/benchmarks/packings.py, packing_profile.py, packing_threads.py and peer_packings.py."""
+"""analysis/benchmarks/packings.py, packing_profile.py, packing_threads.py, iteration_cost.py and peer_packings.py."""
 
 import json
 import sys
@@ -58,6 +58,20 @@ def test_threads_are_told_beside_one(here, capsys):
     for name in ("evaluation", "factorisation"):
         assert found[name]["by_clock"][0] == found[name]["asking"][0] == 1
         assert len(found[name]["by_clock"]) == 3
+
+
+@pytest.mark.lammps
+def test_an_iteration_is_timed_beside_the_pair_style_and_an_older_version(here, capsys, tmp_path):
+    some = ("--cases", "discs", "--n", 32, "--rounds", 1, "--work", tmp_path)
+    here("benchmarks/iteration_cost.py", *some, "--against", sys.executable)
+    found = rows_of(capsys)
+    assert set(found) == {"discs", "discs before"}
+    for row in found.values():
+        assert min(row.values()) > 0
+        assert row["with factors"] > row["solution"]
+        assert row["iteration"] > row["evaluation"]
+        ratio = row["iteration"] / row["pair style"]
+        assert row["iteration over pair style"] == pytest.approx(ratio)
 
 
 PEER = """

@@ -29,7 +29,11 @@ SpherocylinderContact<D, Pack> pairs_of(const SpherocylinderBody<D> *bodies,
   const auto R = [&](const int *index) {
     return Pack::from([&](int k) { return bodies[index[k]].radius; });
   };
-  SpinePair<D, Pack> pair{{}, axes<D>(bodies, i), A(i), axes<D>(bodies, j), A(j)};
+  SpinePair<D, Pack> pair{{}, {}, A(i), {}, A(j)};
+  if (!law.shortcuts || any((pair.A_i > Pack(0.0)) | (pair.A_j > Pack(0.0)))) {
+    pair.u_i = axes<D>(bodies, i);
+    pair.u_j = axes<D>(bodies, j);
+  }
   for (int a = 0; a < D; ++a) pair.r[a] = Pack::load(block.separation[a] + first);
   const SpherocylinderLawOf<Pack> of_lanes{
       {Pack::load(block.k_e + first)}, law.sides, law.shortcuts};

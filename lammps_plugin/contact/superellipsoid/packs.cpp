@@ -11,21 +11,34 @@ namespace {
 
 template <int D> using BodyLanes = SuperellipsoidBody<D, Pack>;
 
-template <int D> BodyLanes<D> lanes_of(const SuperellipsoidBody<D> *bodies, const int *index)
+template <int D, class NumberOf>
+Pack each(const SuperellipsoidBody<D> *bodies, const int *index, const NumberOf &number_of)
 {
-  const auto each = [&](const auto &number_of) {
-    return Pack::from([&](int k) { return number_of(bodies[index[k]]); });
-  };
+  return Pack::from([&](int k) { return number_of(bodies[index[k]]); });
+}
+
+/// Sizes only, all that round bodies need.
+template <int D> BodyLanes<D> sizes_of(const SuperellipsoidBody<D> *bodies, const int *index)
+{
   BodyLanes<D> lanes;
   lanes.p = bodies[index[0]].p;
-  lanes.bounding_radius = each([](const auto &body) { return body.bounding_radius; });
+  lanes.bounding_radius =
+      each<D>(bodies, index, [](const auto &body) { return body.bounding_radius; });
   for (int a = 0; a < D; ++a) {
-    lanes.semi_axes[a] = each([&](const auto &body) { return body.semi_axes[a]; });
-    for (int b = 0; b < D; ++b) {
-      lanes.axis[a][b] = each([&](const auto &body) { return body.axis[a][b]; });
-    }
+    lanes.semi_axes[a] =
+        each<D>(bodies, index, [&](const auto &body) { return body.semi_axes[a]; });
   }
   return lanes;
+}
+
+template <int D>
+void add_axes(BodyLanes<D> &lanes, const SuperellipsoidBody<D> *bodies, const int *index)
+{
+  for (int a = 0; a < D; ++a) {
+    for (int b = 0; b < D; ++b) {
+      lanes.axis[a][b] = each<D>(bodies, index, [&](const auto &body) { return body.axis[a][b]; });
+    }
+  }
 }
 
 template <int D> bool are_round(const BodyLanes<D> &bodies)
@@ -110,12 +123,15 @@ template <int D> FoundLanes<D> found_from(const PairLanes<D> &pairs, const Vec<D
   return found_by<detail::ByPoint<D, Pack>>(pairs, n);
 }
 
-template <int D> void add_load(ContactLanes<D, Pack> &lanes, const TangencyLoad<D, Pack> &load)
+template <int D>
+void add_load(ContactLanes<D, Pack> &lanes, const TangencyLoad<D, Pack> &load, bool turns)
 {
   lanes.energy = load.energy;
   lanes.force = load.force;
-  lanes.torque_i = load.torque_i;
-  lanes.torque_j = load.torque_j;
+  if (turns) {
+    lanes.torque_i = load.torque_i;
+    lanes.torque_j = load.torque_j;
+  }
   lanes.bond_force = norm(load.force);
 }
 
@@ -123,7 +139,8 @@ template <int D>
 ContactLanes<D, Pack> contacts_of(const SuperellipsoidBody<D> *bodies, ContactBlock<D> &block,
                                   int first)
 {
-  PairLanes<D> pairs{lanes_of(bodies, block.i + first), lanes_of(bodies, block.j + first), {}, {}};
+  const int *const i = block.i + first, *const j = block.j + first;
+  PairLanes<D> pairs{sizes_of(bodies, i), sizes_of(bodies, j), {}, {}};
   for (int a = 0; a < D; ++a) pairs.r[a] = Pack::load(block.separation[a] + first);
   const Pack reach = pairs.i.bounding_radius + pairs.j.bounding_radius;
   const Pack distance_sq = norm_sq(pairs.r);
@@ -133,9 +150,12 @@ ContactLanes<D, Pack> contacts_of(const SuperellipsoidBody<D> *bodies, ContactBl
   if (!any(pairs.near)) return lanes;
   lanes.alone = pairs.near & (distance_sq <= COINCIDENT * reach * COINCIDENT * reach);
   FoundLanes<D> of{{}, pairs.near, pairs.near};
-  if (are_round(pairs.i) && are_round(pairs.j)) {
+  const bool round = are_round(pairs.i) && are_round(pairs.j);
+  if (round) {
     of.at = tangency_of_spheres(pairs.r, pairs.i.semi_axes[0], pairs.j.semi_axes[0]);
   } else {
+    add_axes(pairs.i, bodies, i);
+    add_axes(pairs.j, bodies, j);
     of = found_from(pairs, begin(pairs, block, first));
     end(of.at.normal, pairs.near, block, first);
     const Pack gap = gap_of(detail::TangencyProblem<D, Pack>::of(pairs.i, pairs.j, pairs.r), of.at);
@@ -145,7 +165,7 @@ ContactLanes<D, Pack> contacts_of(const SuperellipsoidBody<D> *bodies, ContactBl
   }
   lanes.touching = (of.found & (of.at.scale < Pack(1.0))) | lanes.alone;
   if (!any(lanes.touching)) return lanes;
-  add_load(lanes, {of.at, pairs.r, {Pack::load(block.k_e + first)}});
+  add_load(lanes, {of.at, pairs.r, {Pack::load(block.k_e + first)}}, !round);
   return lanes;
 }
 

@@ -105,6 +105,16 @@ template <int D, class S = double> struct SuperellipsoidBody {
   Plain<S> bounding_radius;
 };
 
+/// Whether a body is a disc or a sphere.
+template <int D, class S> bool is_round(const SuperellipsoidBody<D, S> &body)
+{
+  if (body.p != 1.0) return false;
+  for (int k = 1; k < D; ++k) {
+    if (body.semi_axes[k] != body.semi_axes[0]) return false;
+  }
+  return true;
+}
+
 /// The surface is a face where its curvature is below this fraction of that of the ellipsoid of the
 /// same axes: the point of contact then moves ten times as far when the particle rotates.
 inline constexpr double FACE_CURVATURE = 0.1;

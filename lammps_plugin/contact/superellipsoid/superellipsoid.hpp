@@ -116,15 +116,6 @@ template <int D, class S> class SuperellipsoidContact {
     return touching(in_scalar(found.at), found.gap);
   }
 
-  static bool is_round(const Body &body)
-  {
-    if (body.p != 1.0) return false;
-    for (int k = 1; k < D; ++k) {
-      if (body.semi_axes[k] != body.semi_axes[0]) return false;
-    }
-    return true;
-  }
-
   FoundTangency<D, T> find_tangency(const Vec<D, T> *last) const
   {
     if constexpr (IS_PLAIN) {
@@ -201,6 +192,7 @@ struct SuperellipsoidModel {
   static constexpr int MOST_BONDS = 1;
   static constexpr bool HAS_SIDES = false;
   static constexpr bool BONDS_ARE_CONTACTS = false;
+  static constexpr int OVERLAP_POWER = 2;
 
   static Law law(double epsilon, Sides, bool shortcuts = true) { return {epsilon, shortcuts}; }
   static double k_e(const Law &law) { return law.epsilon; }
@@ -284,7 +276,7 @@ struct SuperellipsoidModel {
     const double distance_sq = norm_sq(r),
                  bounding = i.bounding_radius + j.bounding_radius + margin;
     if (distance_sq >= bounding * bounding) return false;
-    if (distance_sq == 0.0) return true;
+    if (distance_sq == 0.0 || (is_round(i) && is_round(j))) return true;
     using Norm = PowerNorm<D, double>;
     const auto h_i = Norm::support(i), h_j = Norm::support(j);
     const auto divides = [&](const Vec<D> &n) {

@@ -1,11 +1,17 @@
 import numpy as np
 import pytest
+from mixtures import superellipsoids
 from pressed import PRESSED, pressed_named
+from scenes import pressed
 from squeezed import squeezed
+from superellipsoid_packings import pressed_superellipsoids
 
+from jamshape import _contact
 from jamshape.contacts import find_contacts
 from jamshape.landscape import CrossingError, Landscape, State
 from jamshape.landscape.local_energy_model import LocalEnergyModel
+from jamshape.minima import Stop, minimise
+from jamshape.minima.descent import rounding_of_a_bond
 from jamshape.packing import body_axes
 from jamshape.protocols.random_start import random_packing
 from jamshape.shapes.particles import Particles
@@ -62,6 +68,60 @@ def test_particles_that_touch_their_own_images_have_the_factors_of_the_hessian()
     i, j = find_contacts(state.packing(packing), sides=2).pairs.T
     assert (i == j).any()
     require_factors_of_the_hessian(state.packing(packing))
+
+
+def spheres_and_spheroids():
+    """Pairs of two spheres, of two spheroids, and mixed ones."""
+    diameters = np.ones((14, 3))
+    diameters[::3, 2] = 1.5
+    diameters[1::3] *= 1.3
+    return pressed_superellipsoids(diameters, np.ones(14), 0.3)
+
+
+ROUND = {
+    "discs": lambda: pressed_named("discs"),
+    "discs and rods": lambda: pressed_named("discs and rods"),
+    "spheres and rods in space": lambda: pressed_named("spheres and rods in space"),
+    "discs as superellipses": lambda: pressed_superellipsoids(
+        np.repeat(1 + 0.4 * (np.arange(16) % 2)[:, None], 3, 1), np.ones(16), 0.5, dimension=2
+    ),
+    "spheres": lambda: pressed(n=16, dimension=3, mixture=superellipsoids(), phi=0.3),
+    "spheres and spheroids": spheres_and_spheroids,
+}
+
+
+@pytest.mark.parametrize("name", ROUND)
+def test_second_derivatives_of_round_pairs_in_closed_form_are_those_by_dual_numbers(name):
+    require_factors_of_the_hessian(ROUND[name]())
+
+
+def test_doubles_lose_no_digits_to_the_size_of_the_box(packing):
+    """Particles that have moved in many steps, far from the origin: only rounding of overlaps remains."""
+    far = packing.with_(position=packing.position + 1000 * packing.box.edges)
+    landscape, state = Landscape(far), State.of(far)
+    local_model, rng = LocalEnergyModel(landscape, state), np.random.default_rng(5)
+    for _ in range(40):
+        local_model.move(1e-3 * landscape.length * rng.normal(size=landscape.size), -1e-5)
+    still = np.zeros(landscape.size)
+    found, exact = (local_model.evaluate(still, 0.0, extended=wide) for wide in (False, True))
+    assert found.n_bonds == exact.n_bonds > 0
+    rounding = rounding_of_a_bond(landscape, extended=False)
+    if packing.shape_style == "superellipsoid":  # by iteration
+        rounding *= 100
+    assert found.gradient == pytest.approx(exact.gradient, rel=0, abs=10 * rounding)
+
+
+@pytest.mark.parametrize("name", ["discs", "discs and rods"])
+def test_minimisers_have_the_same_bits_with_every_instruction_set(name, monkeypatch):
+    start, ends = ROUND[name](), []
+    for instructions in _contact.instruction_sets():
+        monkeypatch.setenv("JAMSHAPE_SIMD", instructions)
+        if instructions != "scalar":  # which adds up pairs in another order
+            ends.append(minimise(Landscape(start), State.of(start), stop=Stop(1e-6)))
+    assert len(ends[0].history.evaluations) > 10
+    for other in ends[1:]:
+        assert other.history.evaluations == ends[0].history.evaluations
+        assert (other.state.position == ends[0].state.position).all()
 
 
 def stretch_of(landscape):

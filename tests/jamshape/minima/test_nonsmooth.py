@@ -17,7 +17,7 @@ from jamshape.protocols.random_start import random_packing
 TOLERANCE = 1e-8
 N = 32
 SEEDS = (
-    5,
+    44,
     *range(1, 60),
 )  # nearly round rods, of which one packing comes to rest on a corner: the first, on most machines
 
@@ -79,7 +79,7 @@ def test_forces_turn_round_within_a_hair(landscape, state):
 
 @chosen_by_seed
 def test_what_is_pushed_away_comes_back(landscape, state):
-    rng = np.random.default_rng(2)
+    rng = np.random.default_rng(3)
     overlap = landscape.evaluate(state).bond_force * landscape.length**2
     pushed = landscape.displaced(state, 0.03 * overlap * rng.normal(size=landscape.size))
     found = minimise(landscape, pushed, "auto", Stop(TOLERANCE))
