@@ -51,9 +51,10 @@ NB_MODULE(_contact, m)
   jamshape::export_rattlers(m);
   jamshape::export_sparse_product(m);
   jamshape::export_probes(m);
-  m.def("box_times", &jamshape::box_times,
-        "Default time in which a box yields, and the viscosity of the host, from the drag k_d, the\n"
-        "mean measure of the particles, k_e and the dimension.");
+  m.def(
+      "box_times", &jamshape::box_times,
+      "Default time in which a box yields, and the viscosity of the host, from the drag k_d, the\n"
+      "mean measure of the particles, k_e and the dimension.");
   m.def("instruction_sets", &jamshape::instruction_sets,
         "Instruction sets of this machine that contacts in packs are compiled for, as the\n"
         "environment variable JAMSHAPE_SIMD names them, best last; with 'scalar' pairs go one by\n"

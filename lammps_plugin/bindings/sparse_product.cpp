@@ -17,7 +17,8 @@ struct SparseRows {
 
 /// Multiplies rows by some columns from j on of a dense matrix with k columns.
 template <std::size_t COUNT, class T>
-void add_columns(const SparseRows &of, std::size_t row, const T *dense, std::size_t k, long double *to)
+void add_columns(const SparseRows &of, std::size_t row, const T *dense, std::size_t k,
+                 long double *to)
 {
   std::array<long double, COUNT> sum{};
   for (std::int64_t e = of.first[row]; e < of.first[row + 1]; ++e) {
@@ -29,7 +30,8 @@ void add_columns(const SparseRows &of, std::size_t row, const T *dense, std::siz
 }
 
 template <class T>
-void multiply(const SparseRows &of, std::size_t rows, const T *dense, std::size_t k, long double *to)
+void multiply(const SparseRows &of, std::size_t rows, const T *dense, std::size_t k,
+              long double *to)
 {
   for (std::size_t row = 0; row < rows; ++row) {
     std::size_t j = 0;
@@ -71,7 +73,8 @@ void export_sparse_product(nb::module_ &m)
 {
   using namespace nb::literals;
   m.def("sparse_product", &sparse_product, "first"_a, "column"_a, "value"_a, "dense"_a, "is_long"_a,
-        "Rows (m, 2 k) of a sparse matrix, CSR: first (m + 1,), column and value (e,), times a dense\n"
+        "Rows (m, 2 k) of a sparse matrix, CSR: first (m + 1,), column and value (e,), times a "
+        "dense\n"
         "one (n, k) in long double; dense numbers that are long doubles, and the result, are seen\n"
         "as pairs of doubles.");
 }

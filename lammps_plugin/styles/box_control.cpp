@@ -1,7 +1,5 @@
 #include "box_control.h"
 
-#include "packing/box_times.hpp"
-
 #include "atom.h"
 #include "comm.h"
 #include "compat.h"
@@ -10,6 +8,7 @@
 #include "force.h"
 #include "input.h"
 #include "modify.h"
+#include "packing/box_times.hpp"
 #include "text.hpp"
 #include "update.h"
 #include "utils.h"

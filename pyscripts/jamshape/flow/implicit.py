@@ -407,7 +407,9 @@ class ImplicitFlow:
     def __init__(self, landscape: Landscape, flow: Flow, protocol: Course) -> None:
         self.landscape, self.flow, self.protocol = landscape, flow, protocol
         self.local_model = LocalEnergyModel(landscape, flow.state, along_bodies=True)
-        self.box = YieldingBox(protocol.control, landscape, protocol.k_d) if protocol.control else None
+        self.box = (
+            YieldingBox(protocol.control, landscape, protocol.k_d) if protocol.control else None
+        )
         self.still = np.zeros(landscape.size)
         self.drag = drag_coefficients(landscape, protocol.k_d)
         if self.box:

@@ -70,7 +70,7 @@ def two_levels(matrix: DynamicalMatrix, *, refine: bool) -> Found:
     soft, vectors = _divided(matrix)
     high = products.quotients(vectors)
     high_values = high.value.astype(np.float64)
-    soft = _turned(products, soft)
+    soft = _cleaned(products, _turned(products, soft), vectors, high_values)
     low = _low_modes(products, np.column_stack([matrix.translations, soft]), refine)
     # The rest of the space, which is stiffer, lowers low modes by at most leak.leak.
     leak = low.outside / np.sqrt(0.5 * high_values.min(initial=np.inf))
@@ -131,6 +131,17 @@ def _turned(products: Products, vectors: FloatArray) -> FloatArray:
     A, N = _within(vectors, products.images(vectors))
     found = vectors @ scipy.linalg.eigh(A.astype(np.float64), N.astype(np.float64))[1]
     return np.asarray(found / np.linalg.norm(found, axis=0))
+
+
+def _cleaned(
+    products: Products, vectors: FloatArray, high: FloatArray, values: FloatArray
+) -> LongArray:
+    """(n, k) low modes in long double, without what they have of the high ones (n, r), to first order."""
+    at = products.images(vectors)
+    pull = high.T @ at.residual.astype(np.float64)
+    gap = values[:, None] - at.quotients.value.astype(np.float64)
+    part = np.where(np.abs(pull) < CLOSE * gap, pull, 0.0) / np.where(gap > 0, gap, 1.0)
+    return np.asarray(vectors - (high @ part).astype(np.longdouble))
 
 
 def _low_modes(products: Products, vectors: NDArray[Any], refine: bool) -> _LowModes:
