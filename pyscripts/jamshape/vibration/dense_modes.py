@@ -70,8 +70,8 @@ def two_levels(matrix: DynamicalMatrix, *, refine: bool) -> Found:
     soft, vectors = _divided(matrix)
     high = products.quotients(vectors)
     high_values = high.value.astype(np.float64)
-    soft = _cleaned(products, _turned(products, soft), vectors, high_values)
-    low = _low_modes(products, np.column_stack([matrix.translations, soft]), refine)
+    clean = _cleaned(products, _turned(products, soft), vectors, high_values)
+    low = _low_modes(products, np.column_stack([matrix.translations, clean]), refine)
     # The rest of the space, which is stiffer, lowers low modes by at most leak.leak.
     leak = low.outside / np.sqrt(0.5 * high_values.min(initial=np.inf))
     pull = low.coupling + np.outer(leak, leak)
