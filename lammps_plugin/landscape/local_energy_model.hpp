@@ -883,14 +883,14 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   }
 
   /// Adds a pair of particles that no contact can rotate.
-  void add_round(const Curved &pair, double stretch)
+  void add_round(const Curved &pair, double stretch, const Vec<D> &apart)
   {
     const Eigen::Matrix<double, D, D> by =
         stretch * stretch * pair.by.template topLeftCorner<D, D>();
     hessian->add_shifts(pair.p, by.data());
-    const Eigen::Map<const Eigen::Matrix<double, D, 1>> r(pair.r.c);
-    add_pull(pair.p, 0, by * r / stretch);
-    add_pull(pair.p, 1, -by * r / stretch);
+    const Eigen::Map<const Eigen::Matrix<double, D, 1>> along(apart.c);
+    add_pull(pair.p, 0, by * along / stretch);
+    add_pull(pair.p, 1, -by * along / stretch);
   }
 
   /// Adds the force by which the strain pulls the first or second particle of a pair.
@@ -904,8 +904,14 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
 
   void add_pair(const Curved &pair, double stretch)
   {
-    if (!pair.turns) return add_round(pair, stretch);
     const auto &[p, r, turns, by] = pair;
+    // The affine strain displaces i relative to j in proportion to r.
+    Vec<D> apart;
+    for (int d = 0; d < D; ++d) apart[d] = strained[d] * r[d];
+    for (int a = 0; a < D; ++a) {
+      for (int b = 0; b < D; ++b) pulled_back += apart[a] * by(a, b) * apart[b];
+    }
+    if (!turns) return add_round(pair, stretch, apart);
     double scale[2][BLOCK];
     for (int side = 0; side < 2; ++side) {
       const std::size_t particle = pairs.particles[2 * p + side];
@@ -920,12 +926,6 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
         scaled(a, b) = scale[a / BLOCK][a % BLOCK] * scale[b / BLOCK][b % BLOCK] *
                        by(variable(a / BLOCK, a % BLOCK), variable(b / BLOCK, b % BLOCK));
       }
-    }
-    // The affine strain displaces i relative to j in proportion to r.
-    Vec<D> apart;
-    for (int d = 0; d < D; ++d) apart[d] = strained[d] * r[d];
-    for (int a = 0; a < D; ++a) {
-      for (int b = 0; b < D; ++b) pulled_back += apart[a] * by(a, b) * apart[b];
     }
     Eigen::Matrix<double, BLOCK, 1> pull[2];
     for (int side = 0; side < 2; ++side) {

@@ -30,10 +30,17 @@ SHAPES = {
 
 
 @cache
-def dense(name, n=16):
+def dense(name, n=16, seed=1):
     particles, phi, dimension = SHAPES[name]
-    start = random_packing(n, 0.3 if dimension == 2 else 0.1, 1, particles, dimension)
+    start = random_packing(n, 0.3 if dimension == 2 else 0.1, seed, particles, dimension)
     return compressed_to(Landscape(start), State.of(start), phi, 1e-2).packing(start)
+
+
+def bonds_of(packing):
+    """Pairs of contacts, and which bonds end on a side."""
+    found = js.energy(packing).contacts
+    pairs = found.network.pairs[found.bonds.contact]
+    return sorted(zip(pairs.tolist(), found.bonds.on_side.tolist(), strict=True))
 
 
 def flowed(start, course, **fields):
@@ -135,13 +142,18 @@ def fixed_steps(monkeypatch):
 def test_with_lasting_contacts_it_is_the_motion_of_lammps_to_second_order(
     name, method, fixed_steps, tmp_path, measured
 ):
-    start, gdot, strain = dense(name), 1e-4, 4e-4
+    gdot, strain = 1e-4, 4e-4
     held = {"pressure": 1e-2, "t_box": 20.0}
-    exact = js.shear(start=start, gdot=gdot, strain=strain, integrator="rkc2", integration_tolerance=1e-9, rows=4,
-                     file=tmp_path / "a.h5", progress=False, **held)  # fmt: skip
+    for seed in range(1, 9):  # until no contact opens, closes or passes from a side to a tip
+        start = dense(name, seed=seed)
+        exact = js.shear(start=start, gdot=gdot, strain=strain, integrator="rkc2", integration_tolerance=1e-11, rows=4,
+                         file=tmp_path / f"{seed}.h5", progress=False, **held)  # fmt: skip
+        if bonds_of(start) == bonds_of(exact.packing(-1)):
+            break
+    assert bonds_of(start) == bonds_of(exact.packing(-1))
     assert abs(exact["p_yy"][-1] / exact["p_yy"][0] - 1) > 1e-3
     errors = []
-    for n in (8, 16, 32):
+    for n in (16, 32, 64):
         course = SlowShear(gdot, strain, tolerance=1e-5, largest_strain=1.0, method=method,
                            hold_pressure=1e-2, t_box=20.0)  # fmt: skip
         flow = fixed_steps(start, course, strain / gdot / n)
@@ -252,10 +264,10 @@ def test_going_on_from_between_two_steps_gives_the_same_to_the_bit(name):
     course = SlowShear(1e-4, 0.02, tolerance=1e-2, hold_pressure=1e-2, t_box=20.0)
     landscape, flow = Landscape(start), Flow(State.of(start))
     for step in follow(landscape, flow, course):
-        if step.step == 20:
+        if step.step == 10:
             flow.forget()
             fresh = Flow(**{k: v for k, v in vars(flow).items() if not k.startswith("_")})
-    assert step.step > 25
+    assert step.step > 15
     list(follow(Landscape(start), fresh, course))
     for part in ("position", "orientation", "cell"):
         np.testing.assert_array_equal(getattr(fresh.state, part), getattr(flow.state, part))
