@@ -128,8 +128,6 @@ def figure_from(found: list[Scaling]) -> Figure:
     """Draw G on the left and G - G_0 on the right."""
     figure = figure_of(9.5, 4.6, dpi=160)
     left, right = figure.subplots(1, 2)
-    for axes in (left, right):
-        axes.set(xscale="log", yscale="log", xlabel=r"pressure $p$  $[k_e/R^2]$")
     for k, of in enumerate(found):
         for j, name in enumerate(DRAWN):
             style = marked(k + j * len(found))
@@ -139,6 +137,10 @@ def figure_from(found: list[Scaling]) -> Figure:
             average = of.averages[name]
             left.errorbar(of.p, average.G, average.error, **style, label=label)
             _draw_power(right, of, name, style)
+    for axes in (left, right):
+        is_positive = axes.dataLim.y1 > 0  # few small packings may all be unstable
+        axes.set(xscale="log", xlabel=r"pressure $p$  $[k_e/R^2]$")
+        axes.set_yscale("log" if is_positive else "linear")
     left.set(ylabel=r"shear modulus $\langle G\rangle$  $[k_e/R^2]$")
     right.set(ylabel=r"$\langle G\rangle-G_0$  $[k_e/R^2]$")
     left.legend(fontsize=7)

@@ -52,7 +52,8 @@ NB_MODULE(_contact, m)
   jamshape::export_sparse_product(m);
   jamshape::export_probes(m);
   m.def(
-      "box_times", &jamshape::box_times,
+      "box_times", &jamshape::box_times, nanobind::arg("drag"), nanobind::arg("measure"),
+      nanobind::arg("stiffness"), nanobind::arg("dimension"),
       "Default time in which a box yields, and the viscosity of the host, from the drag k_d, the\n"
       "mean measure of the particles, k_e and the dimension.");
   m.def("instruction_sets", &jamshape::instruction_sets,

@@ -134,7 +134,7 @@ template <int D, class S> class SpherocylinderContact {
     const Sharing of = shared_by(closest, far_end, w);
     ContactLanes<D, S> lanes;
     lanes.touching = touches(closest.distance_sq);
-    lanes.two_bonds = lanes.touching;
+    lanes.two_bonds = lanes.touching & (of.far.share > S(LEAST_SHARE));
     lanes.alone = !(w.value > S(LEAST_END_EXPONENT));
     const Load near = add_load(lanes, closest, of.distance, of.near);
     const Load far = add_load(lanes, far_end, of.far_distance, of.far);

@@ -54,21 +54,23 @@ def test_a_jammed_packing_is_opened_to_the_tolerance(ended):
     assert (phi[is_opened] > loose[-1]).all()
 
 
-def test_where_it_falls_apart_steps_are_halved_from_the_densest_unjammed_state(monkeypatch, ended):
+def test_where_it_falls_apart_steps_are_halved_from_the_densest_unjammed_state(monkeypatch):
+    usual = begun(phi=0.49)  # from 0.5 a state that jams by chance falls apart to the last halving
+    list(compress(*usual))
     monkeypatch.setattr(quasistatic, "_MOST_OPENINGS", 0)
-    landscape, compression, protocol = begun()
+    landscape, compression, protocol = begun(phi=0.49)
     rows = [(c.step, c.loose_phi) for c in compress(landscape, compression, protocol)]
     step, loose = np.array(rows).T
     assert step[0] == protocol.step
     # Known only to the rounding of phi, of which they are differences.
     halvings = np.log2(protocol.step / step)
     np.testing.assert_allclose(halvings, np.rint(halvings), atol=1e-6)
-    assert (np.diff(step) <= 0).all()
+    assert (np.diff(step) <= 1e-12).all()
     assert (np.diff(loose) >= 0).all()
     assert step[-1] < protocol.step / 4
     per_particle = compression.minimum.evaluation.energy / landscape.particles.n
     assert 1 < per_particle / protocol.energy <= protocol.closeness
-    assert compression.phi == pytest.approx(ended[1].phi, abs=protocol.step)
+    assert compression.phi == pytest.approx(usual[1].phi, abs=protocol.step)
 
 
 def test_opening_too_far_ends_in_halvings(monkeypatch):

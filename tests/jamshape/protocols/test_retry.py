@@ -1,5 +1,9 @@
 """The second attempt relaxes stalled packings until forces balance, the same after a kill."""
 
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
 import numpy as np
 import pytest
 from making import stages_of, write_every_mark
@@ -15,11 +19,22 @@ from jamshape.protocols.defaults import recipe_for
 from jamshape.protocols.make import make
 from jamshape.protocols.retry import _PRICE, Retry, go_on
 
-SEED = 34  # of 16 rods of alpha = 4 that end sliding
+
+@cache
+def seed():
+    """Return that of 16 rods of alpha = 4 that end sliding, and are cured: which it is depends on the last digits."""
+    for k in (36, 32, 100, 115, 34, *range(1, 120)):
+        with TemporaryDirectory() as folder:
+            out = Path(folder) / "packing.h5"
+            make(recipe_for(bidisperse(4.0), n=16, seed=k, u0=1e-12), out)
+            found = read_attributes(out)
+        if (found.get("retry_of"), found["outcome"]) == ("sliding", "converged"):
+            return k
+    raise AssertionError
 
 
 def recipe(**more):
-    return recipe_for(bidisperse(4.0), n=16, seed=SEED, u0=1e-12, **more)
+    return recipe_for(bidisperse(4.0), n=16, seed=seed(), u0=1e-12, **more)
 
 
 def made(out, **how):
@@ -85,14 +100,14 @@ def test_what_it_does_not_cure_stays_as_it_was_and_is_said(stalled, tmp_path, mo
         js.NotReachedWarning, match="ended sliding after a second attempt, with net forces up to"
     ):
         packing = js.make_packing(
-            bidisperse(4.0), n=16, seed=SEED, u0=1e-12, file=out, progress=False
+            bidisperse(4.0), n=16, seed=seed(), u0=1e-12, file=out, progress=False
         )
     assert not packing.reached
     before, _ = stalled
     for one, other in zip(packing.poses(), read_packing(before).poses(), strict=True):
         np.testing.assert_array_equal(one, other)
     with pytest.warns(js.NotReachedWarning):  # also where it is only read again
-        js.make_packing(bidisperse(4.0), n=16, seed=SEED, u0=1e-12, file=out, progress=False)
+        js.make_packing(bidisperse(4.0), n=16, seed=seed(), u0=1e-12, file=out, progress=False)
     with pytest.warns(js.NotReachedWarning, match="ended sliding"):
         modes = js.modes(packing, lowest=4)
     assert len(js.modes(packing, lowest=4, force=True)) == len(modes)
