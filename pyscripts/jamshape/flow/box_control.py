@@ -70,11 +70,11 @@ class BoxControl:
         if pressure is None:
             msg = f"t_box {t_box} without a pressure, expected both or no time"
             raise ValueError(msg)
-        held = cls(pressure, t_box)
+        held = cls(float(pressure), None if t_box is None else float(t_box))
         if flow != "simple":
             msg = f"flow {flow} drives the height of the box, which a pressure needs, expected flow simple or no pressure"
             raise ValueError(msg)
-        return cls(float(held.pressure), None if held.t_box is None else float(held.t_box))
+        return held
 
 
 def default_times(landscape: Landscape, k_d: float) -> tuple[float, float]:
