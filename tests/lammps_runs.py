@@ -213,7 +213,7 @@ def state_from(table, lo, hi, step=0, like=None, tilt=(0.0, 0.0, 0.0)):
         torque = torque[:, 2]
     known = {}
     if like is not None:
-        known = {"shape_style": like.shape_style, "exponent": like.sorted_by_id().exponent}
+        known = {"shape_style": like.shape_style, "form": like.sorted_by_id().form}
     packing = Packing(
         position=table[:, 2 : 2 + D],
         orientation=angle_from_quaternion(quaternion) if D == 2 else quaternion,

@@ -137,7 +137,7 @@ def lifted(flat: Packing) -> Packing:
         position=np.column_stack([flat.position, zero]),
         orientation=flat.quaternions,
         diameters=flat.diameters,
-        exponent=flat.exponent,
+        form=flat.form,
         species=flat.species,
         id=flat.id,
         box=Box(np.append(flat.box.lo, -edges[2] / 2), edges),

@@ -236,7 +236,7 @@ class AlongModes:
         self, packing: Packing, coordinates: Coordinates, k_e: float | None = None
     ) -> None:
         self.coordinates = coordinates
-        rows = ["position", "orientation", "diameters", "exponent", "species", "id", "image"]
+        rows = ["position", "orientation", "diameters", "form", "species", "id", "image"]
         rows += ["position_rest", "orientation_rest"]
         backbone = coordinates.backbone
         self.particles = packing.with_(**{row: getattr(packing, row)[backbone] for row in rows})

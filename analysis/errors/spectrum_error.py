@@ -106,7 +106,7 @@ def tiled(packing: Packing, k: int) -> tuple[Packing, State]:
         position=where.astype(np.float64),
         orientation=turned.astype(np.float64),
         diameters=diameters,
-        exponent=np.tile(packing.exponent, len(shifts)),
+        form=np.tile(packing.form, (len(shifts), 1)),
         species=np.tile(packing.species, len(shifts)),
         id=np.arange(1, packing.n * len(shifts) + 1),
         box=Box.of(packing.box.lo, k * packing.box.matrix),

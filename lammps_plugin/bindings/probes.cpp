@@ -86,7 +86,9 @@ struct SuperellipsoidRows {
   template <int D> static std::optional<Superellipsoid> shape(const double *row)
   {
     const double *axes = row + D + (D == 2 ? 1 : 4);
-    return Model::shape_from({{axes[0], axes[1], D == 2 ? axes[1] : axes[D - 1]}}, axes[D]);
+    const auto form = Model::Form::from({axes[D]}, D);
+    if (!form) return std::nullopt;
+    return Model::shape_from({{axes[0], axes[1], D == 2 ? axes[1] : axes[D - 1]}}, *form);
   }
 
   template <int D, class S = double> static QuaternionOf<S> orientation(const double *turn)

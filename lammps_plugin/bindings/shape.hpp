@@ -7,6 +7,7 @@
 #include "bindings/pairs.hpp"
 #include "text.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <string>
@@ -56,31 +57,38 @@ template <class Model> class ShapeOf {
   using Shape = typename Model::Shape;
   using Law = typename Model::Law;
 
-  ShapeOf(const Array2<double> &diameters, const Array1<double> &exponent, int dimension,
+  ShapeOf(const Array2<double> &diameters, const Array2<double> &form, int dimension,
           double k_e, int sides) :
-      ShapeOf(diameters, exponent, dimension, Laws<Law>(law_of<Model>(k_e, sides)))
+      ShapeOf(diameters, form, dimension, Laws<Law>(law_of<Model>(k_e, sides)))
   {
   }
 
   /// k_e (T, T) by species (N,), numbered from 1.
-  ShapeOf(const Array2<double> &diameters, const Array1<double> &exponent, int dimension,
+  ShapeOf(const Array2<double> &diameters, const Array2<double> &form, int dimension,
           const Array2<double> &k_e, const Array1<std::int64_t> &species, int sides) :
-      ShapeOf(diameters, exponent, dimension, laws_of<Model>(k_e, species, sides))
+      ShapeOf(diameters, form, dimension, laws_of<Model>(k_e, species, sides))
   {
     require(species.size() == n(), "species does not have the shape (N,).");
   }
 
-  ShapeOf(const Array2<double> &diameters, const Array1<double> &exponent, int dimension,
+  ShapeOf(const Array2<double> &diameters, const Array2<double> &form, int dimension,
           Laws<Law> laws) : space(dimension), contact_laws(std::move(laws))
   {
     require(dimension == 2 || dimension == 3,
             "dimension is " + std::to_string(dimension) + ", expected 2 or 3.");
-    require(diameters.shape(1) == 3 && exponent.shape(0) == diameters.shape(0),
-            "diameters and exponent do not have shapes (N, 3) and (N,).");
+    require(diameters.shape(1) == 3 && form.shape(0) == diameters.shape(0),
+            "diameters and form do not have shapes (N, 3) and (N, K).");
     particles.reserve(diameters.shape(0));
+    FormNumbers last;
+    std::optional<typename Model::Form> its = Model::Form::from(last, dimension);
     for (std::size_t i = 0; i < diameters.shape(0); ++i) {
-      const auto shape =
-          Model::shape_from(0.5 * read_vec<3>(diameters.data() + 3 * i), exponent.data()[i]);
+      const double *const row = form.data() + form.shape(1) * i;
+      if (!std::equal(last.begin(), last.end(), row, row + form.shape(1))) {
+        last.assign(row, row + form.shape(1));
+        its = Model::Form::from(last, dimension);
+      }
+      std::optional<Shape> shape;
+      if (its) shape = Model::shape_from(0.5 * read_vec<3>(diameters.data() + 3 * i), *its);
       require(shape.has_value(), "particle " + std::to_string(i) +
                                      " is not a valid shape: " + Model::SHAPE_RULE + ".");
       particles.push_back(*shape);

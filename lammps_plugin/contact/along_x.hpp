@@ -24,9 +24,12 @@ template <class ShapeAlongX> struct AlongX {
   template <int D, class S = double> using Body = BodyAlongX<Shape, D, S>;
   template <int D> using Start = NoStart;
 
-  /// Returns nothing if the semi-axes do not describe this shape. The second argument is the
-  /// exponent of other shapes.
-  static std::optional<Shape> shape_from(const Vec<3> &semi_axes, double)
+  using Form = NoForm;
+  static constexpr const char *FORM = "";
+  static constexpr const char *FORM_RULE = "none";
+
+  /// Returns nothing if the semi-axes do not describe this shape.
+  static std::optional<Shape> shape_from(const Vec<3> &semi_axes, const Form &)
   {
     const bool is_one = semi_axes[1] == semi_axes[2] && semi_axes[0] >= semi_axes[1] &&
                         semi_axes[1] > 0.0 && std::isfinite(semi_axes[0]);

@@ -2,7 +2,9 @@
 
 #include "contact/math/vec.hpp"
 
+#include <optional>
 #include <type_traits>
+#include <vector>
 
 namespace jamshape {
 
@@ -19,6 +21,18 @@ enum class ContactKind { TIP_TO_TIP = 0, TIP_TO_SIDE = 1, SIDE_TO_SIDE = 2 };
 /// (Marschall & Teitel 2018: one in the dynamics, Fig. 1d; two for minima and the dynamical matrix,
 /// Fig. 6). Others ignore it.
 enum class Sides { ONE = 1, TWO = 2 };
+
+/// Numbers of a particle beside its three semi-axes, such as exponents: in LAMMPS by type, in Python
+/// a row of `Packing.form`. A model makes its `Form` of them.
+using FormNumbers = std::vector<double>;
+
+/// The form of shapes that are given by their semi-axes alone.
+struct NoForm {
+  static std::optional<NoForm> from(const FormNumbers &numbers, int /*dimension*/)
+  {
+    return numbers.empty() ? std::optional<NoForm>(NoForm{}) : std::nullopt;
+  }
+};
 
 /// Shapes whose contacts among themselves have a closed form and need no search.
 enum class Shortcut { NONE, ROUND, ELLIPSOIDS };

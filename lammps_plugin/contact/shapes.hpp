@@ -1,5 +1,6 @@
 #pragma once
 
+#include "contact/clump/clump.hpp"
 #include "contact/dimer/dimer.hpp"
 #include "contact/spherocylinder/spherocylinder.hpp"
 #include "contact/superellipsoid/superellipsoid.hpp"
@@ -12,6 +13,6 @@ template <class... Models> struct ShapeList {
 };
 
 /// All shapes available in Python and the command `create_random`.
-using Shapes = ShapeList<SpherocylinderModel, SuperellipsoidModel, DimerModel>;
+using Shapes = ShapeList<SpherocylinderModel, SuperellipsoidModel, DimerModel, ClumpModel>;
 
 }  // namespace jamshape

@@ -14,7 +14,7 @@
 
 namespace jamshape {
 
-/// Semi-axes and exponent, the numbers that LAMMPS holds of a shape.
+/// The numbers that determine a shape: semi-axes, and the first type of its form.
 using ShapeNumbers = std::array<double, 4>;
 
 /// Own and ghost particles as bodies of a model, all stored: for small bodies, whose contacts take
@@ -75,7 +75,7 @@ template <class Model, int D> class StoredBodies {
   std::vector<Body> now;
 };
 
-/// The same for large bodies: each kind of shape (semi-axes and p) is stored once, and bodies are
+/// The same for large bodies: each kind of shape (semi-axes and form) is stored once, and bodies are
 /// assembled on demand, from LAMMPS's positions and the last orientations read.
 template <class Model, int D> class AssembledBodies {
  public:

@@ -140,11 +140,12 @@ void CreateRandom::read(int narg, char **arg)
       kinds.push_back({of(1, "SHARE"), {{of(2, "DX"), of(3, "DY"), of(4, "DZ")}}});
       require(kinds.back().share > 0.0 && std::isfinite(kinds.back().share), "a positive SHARE");
       k += 5;
-    } else if (word == "exponent" && k + 1 < narg && !kinds.empty()) {
-      kinds.back().exponent = number(arg[k + 1], "exponent");
-      k += 2;
+    } else if ((word == "form" || word == "exponent") && k + 1 < narg && !kinds.empty()) {
+      for (++k; k < narg && std::string(arg[k]) != "type"; ++k) {
+        kinds.back().form.push_back(number(arg[k], word.c_str()));
+      }
     } else {
-      require(false, "'type SHARE DX DY DZ' or 'exponent P' after it, not '" + word + "'");
+      require(false, "'type SHARE DX DY DZ' or 'form NUMBER ...' after it, not '" + word + "'");
     }
   }
   require(!kinds.empty(), "at least one 'type SHARE DX DY DZ' at the end");
@@ -154,7 +155,9 @@ template <class Model, int D> std::vector<typename Model::Shape> CreateRandom::s
 {
   std::vector<typename Model::Shape> shapes;
   for (const Kind &kind : kinds) {
-    const auto shape = Model::shape_from(0.5 * kind.diameters, kind.exponent);
+    const auto form = Model::Form::from(kind.form, D);
+    require(form.has_value(), std::string("'form' with ") + Model::FORM_RULE);
+    const auto shape = Model::shape_from(0.5 * kind.diameters, *form);
     require(shape.has_value(), std::string("diameters of its shape (") + Model::SHAPE_RULE + ")");
     shapes.push_back(*shape);
   }

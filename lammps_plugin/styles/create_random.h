@@ -1,5 +1,6 @@
 #pragma once
 
+#include "contact/contact.hpp"
 #include "contact/math/vec.hpp"
 
 #include "compat.h"
@@ -11,7 +12,7 @@
 
 namespace jamshape {
 
-/// The command `create_random SHAPE N PHI SEED type SHARE DX DY DZ [exponent P] ...`: a periodic
+/// The command `create_random SHAPE N PHI SEED type SHARE DX DY DZ [form NUMBER ...] ...`: a periodic
 /// box with non-overlapping particles at random positions and orientations. Every rank finds all
 /// positions and keeps its own, so that a seed gives the same state on any number of ranks.
 class CreateRandom : public LAMMPS_NS::Command {
@@ -19,11 +20,11 @@ class CreateRandom : public LAMMPS_NS::Command {
   explicit CreateRandom(LAMMPS_NS::LAMMPS *lmp) : Command(lmp), view(lmp) {}
   void command(int narg, char **arg) override;
 
-  /// A type of particles: diameters, exponent, and its share of all particles.
+  /// A type of particles: diameters, further numbers, and its share of all particles.
   struct Kind {
     double share;
     Vec<3> diameters;
-    double exponent = 1.0;
+    FormNumbers form;
   };
   /// Poses of all particles by ascending ID, as consecutive doubles.
   struct Start {

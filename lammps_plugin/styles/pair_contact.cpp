@@ -19,8 +19,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
+#include <fstream>
 #include <mpi.h>
+#include <sstream>
 #include <stdexcept>
 
 namespace jamshape {
@@ -35,6 +38,9 @@ constexpr double ROUNDING = 1e-12;
 /// Largest rotation out of the plane that rounding can explain [rad]: it changes projected lengths
 /// by a relative 1e-16.
 constexpr double MOST_TILT = 1e-8;
+
+/// Length of numbers of a type in a data file, of whose lines LAMMPS reads 255 characters.
+constexpr std::size_t LONGEST_COEFFICIENTS = 200;
 
 bool begins_with(const char *text, const char *beginning)
 {
@@ -109,6 +115,8 @@ void PairContact::allocate()
     std::fill_n(setflag[i], n, 0);
     std::fill_n(k_e[i], n, 0.0);
   }
+  form_of.assign(n, {});
+  for (int type = 1; type < n; ++type) take_form(type, {});
   allocated = 1;
 }
 
@@ -121,8 +129,9 @@ void PairContact::settings(int narg, char **arg)
 
 void PairContact::coeff(int narg, char **arg)
 {
-  require_arguments(narg == 3, narg);
+  require_arguments(narg == 3 || (narg > 3 && !form_name().empty()), narg);
   if (!allocated) allocate();
+  if (narg > 3) read_form(narg, arg);
   int ilo, ihi, jlo, jhi;
   LAMMPS_NS::utils::bounds(FLERR, std::string(arg[0]), 1, atom->ntypes, ilo, ihi, error);
   LAMMPS_NS::utils::bounds(FLERR, std::string(arg[1]), 1, atom->ntypes, jlo, jhi, error);
@@ -138,6 +147,77 @@ void PairContact::coeff(int narg, char **arg)
   if (n_set > 0) return;
   error->all(FLERR, "pair_coeff of " + style_name() + " found types '" + arg[0] + " " + arg[1] +
                         "', expected I <= J: write the smaller type first.");
+}
+
+std::string PairContact::coeff_rule() const
+{
+  const std::string plain = "I J " + energy_name();
+  if (form_name().empty()) return "'" + plain + "'";
+  return "'" + plain + "' or 'I I " + energy_name() + " " + form_name() + "'";
+}
+
+/// Numbers, or the name of a file of them, belong to a type: to all types of a line whose I and J
+/// are the same.
+void PairContact::read_form(int narg, char **arg)
+{
+  const std::string text = joined(narg - 3, arg + 3);
+  int lo[2], hi[2];
+  for (int k = 0; k < 2; ++k) {
+    LAMMPS_NS::utils::bounds(FLERR, std::string(arg[k]), 1, atom->ntypes, lo[k], hi[k], error);
+  }
+  if (lo[0] != lo[1] || hi[0] != hi[1]) {
+    error->all(FLERR, "pair_coeff of " + style_name() + " found " + form_name() + " = " + text +
+                          " for types " + arg[0] + " and " + arg[1] + ", expected " + form_name() +
+                          " only for equal types: it belongs to a type; give it with 'pair_coeff "
+                          "I I " +
+                          energy_name() + " " + form_name() + "'.");
+  }
+  FormNumbers numbers;
+  if (narg > 4 || !read_numbers(arg[3], numbers)) {
+    for (int k = 3; k < narg; ++k) {
+      numbers.push_back(LAMMPS_NS::utils::numeric(FLERR, arg[k], false, lmp));
+    }
+  }
+  for (int type = lo[0]; type <= hi[0]; ++type) set_form(type, numbers, text);
+}
+
+/// Reads a text file of numbers, in which # begins a comment; returns whether there is one.
+bool PairContact::read_numbers(const std::string &name, FormNumbers &numbers) const
+{
+  constexpr int WRONG = -2;
+  int n = -1;
+  std::string wrong;
+  if (comm->me == 0 && !LAMMPS_NS::utils::is_double(name)) {
+    std::ifstream file(name);
+    if (file.good()) n = 0;
+    std::string line, word;
+    while (std::getline(file, line)) {
+      std::istringstream words(line.substr(0, line.find('#')));
+      while (words >> word) {
+        if (!LAMMPS_NS::utils::is_double(word)) wrong = word;
+        numbers.push_back(std::strtod(word.c_str(), nullptr));
+      }
+    }
+    if (n == 0) n = wrong.empty() ? static_cast<int>(numbers.size()) : WRONG;
+  }
+  MPI_Bcast(&n, 1, MPI_INT, 0, world);
+  if (n == WRONG) {
+    error->all(FLERR, "pair_coeff of " + style_name() + " found '" + wrong + "' in " + name +
+                          ", expected numbers alone, " + form_rule() + ".");
+  }
+  if (n < 0) return false;
+  numbers.resize(n);
+  MPI_Bcast(numbers.data(), n, MPI_DOUBLE, 0, world);
+  return true;
+}
+
+void PairContact::set_form(int type, const FormNumbers &numbers, const std::string &text)
+{
+  if (!take_form(type, numbers)) {
+    error->all(FLERR, "pair_coeff of " + style_name() + " found " + form_name() + " = " + text +
+                          ", expected " + form_rule() + ".");
+  }
+  form_of[type] = numbers;
 }
 
 void PairContact::require_energy(double energy, const std::string &text,
@@ -174,6 +254,21 @@ void PairContact::stop_at_shape(const Vec<3> &semi_axes, const std::string &whic
   refuse(lmp, FLERR,
          found + " with diameters " + shown(diameters[0]) + " " + shown(diameters[1]) + " " +
              shown(diameters[2]) + ", expected that " + shape_rule() + ": correct its shape.");
+}
+
+/// Shapes are read at the start of a run, numbers of types with them.
+void PairContact::require_lasting_types() const
+{
+  const bool is_mixture =
+      std::any_of(form_of.begin() + 1, form_of.end(), [&](const auto &f) { return f != form(1); });
+  for (int k = 0; is_mixture && k < modify->nfix; ++k) {
+    if (std::string(modify->fix[k]->style) != "atom/swap") continue;
+    error->all(FLERR, "pair_style " + style_name() +
+                          " found fix atom/swap, which changes types between evaluations, "
+                          "expected the same " +
+                          form_name() + " for all types: give it with 'pair_coeff * * " +
+                          energy_name() + " " + form_name() + "'.");
+  }
 }
 
 /// Finds the largest particle of each type, and whether any particle can rotate. Sizes are per
@@ -217,6 +312,7 @@ void PairContact::init_style()
                           "which both give the geometric mean of energies: leave it out.");
   }
   particles.find_ellipsoids("pair_style " + style_name());
+  require_lasting_types();
   choose_instructions();
   is_ours.assign(atom->ntypes + 1, force->pair == this);  // in a hybrid style init_one sets them
   measure_particles();
@@ -541,6 +637,40 @@ std::vector<LocalBond> PairContact::reported_bonds()
 
 /* ---------------------------------------------------------------------- */
 
+/// For shapes that have numbers of types: their number, negative, and they. (Version 0.1 had an
+/// exponent of each type alone, which is positive.)
+void PairContact::write_forms(FILE *fp) const
+{
+  for (int type = 1; type <= atom->ntypes; ++type) {
+    const double size = -static_cast<double>(form(type).size());
+    fwrite(&size, sizeof(double), 1, fp);
+    fwrite(form(type).data(), sizeof(double), form(type).size(), fp);
+  }
+}
+
+void PairContact::read_forms(FILE *fp)
+{
+  const auto read = [&](double *to, std::size_t n) {
+    if (comm->me == 0) LAMMPS_NS::utils::sfread(FLERR, to, sizeof(double), n, fp, nullptr, error);
+    MPI_Bcast(to, static_cast<int>(n), MPI_DOUBLE, 0, world);
+  };
+  for (int type = 1; type <= atom->ntypes; ++type) {
+    double size;
+    read(&size, 1);
+    FormNumbers numbers(size > 0.0 ? 1 : static_cast<std::size_t>(-size), size);
+    if (!(size > 0.0)) read(numbers.data(), numbers.size());
+    set_form(type, numbers, "the numbers of a restart file");
+  }
+}
+
+/// LAMMPS reads lines of limited length from data files: longer ones stay with the deck.
+std::string PairContact::more_coefficients(int type) const
+{
+  std::string text;
+  for (const double number : form(type)) text += " " + exactly(number);
+  return text.size() < LONGEST_COEFFICIENTS ? text : "";
+}
+
 void PairContact::write_restart(FILE *fp)
 {
   for (int i = 1; i <= atom->ntypes; ++i) {
@@ -549,6 +679,7 @@ void PairContact::write_restart(FILE *fp)
       fwrite(&k_e[i][j], sizeof(double), 1, fp);
     }
   }
+  if (!form_name().empty()) write_forms(fp);
 }
 
 void PairContact::read_restart(FILE *fp)
@@ -565,6 +696,7 @@ void PairContact::read_restart(FILE *fp)
       k_e[j][i] = k_e[i][j];
     }
   }
+  if (!form_name().empty()) read_forms(fp);
 }
 
 void PairContact::write_data(FILE *fp)

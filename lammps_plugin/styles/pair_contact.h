@@ -126,17 +126,20 @@ class PairContact : public LAMMPS_NS::Pair {
   virtual std::string style_name() const = 0;
   virtual std::string settings_rule() const { return "no arguments: leave them out"; }
   virtual std::string energy_name() const { return "k_e"; }
-  virtual std::string coeff_rule() const { return "'I J k_e'"; }
-  /// Further coefficients of a type, as they follow the energy in 'pair_coeff I I'.
-  virtual std::string more_coefficients(int /*type*/) const { return ""; }
   virtual std::string without_force() const { return "crossing spines or coinciding centres"; }
 
   /// Whether the contacts of the last evaluation are those of the present atoms.
   virtual bool has_current_contacts() const = 0;
 
-  /// Checks one shape and returns a description of the required one. Some shapes have an exponent,
-  /// by type.
-  virtual double exponent(int /*type*/) const { return 1.0; }
+  /// The numbers of a type beside its size, as they follow the energy in 'pair_coeff I I'.
+  const FormNumbers &form(int type) const { return form_of[type]; }
+  /// Takes the numbers of a type; returns false, with everything as before, if they are none.
+  virtual bool take_form(int type, const FormNumbers &numbers) = 0;
+  /// What they are, empty for shapes without, and a description of the required ones.
+  virtual std::string form_name() const = 0;
+  virtual std::string form_rule() const = 0;
+
+  /// Checks one shape and returns a description of the required one.
   virtual bool is_valid_shape(const Vec<3> &semi_axes, int type) const = 0;
   virtual std::string shape_rule() const = 0;
   virtual bool turns(const Vec<3> &semi_axes, int type) const = 0;
@@ -172,6 +175,7 @@ class PairContact : public LAMMPS_NS::Pair {
   bool is_mine(int i, int j) const;
 
  private:
+  std::vector<FormNumbers> form_of;      // per type, from 1
   std::vector<char> is_ours;             // per type: whether this style acts on its particles
   std::vector<double> largest_radius;    // per type: bounding radius of the largest particle
   std::vector<double> x_extra, f_extra;  // rotations as lengths, for the minimiser
@@ -182,6 +186,14 @@ class PairContact : public LAMMPS_NS::Pair {
   std::string told, said;  // the last line in the log, without and with its numbers
 
   void allocate();
+  std::string coeff_rule() const;
+  void read_form(int narg, char **arg);
+  bool read_numbers(const std::string &name, FormNumbers &numbers) const;
+  void set_form(int type, const FormNumbers &numbers, const std::string &text);
+  void write_forms(FILE *fp) const;
+  void read_forms(FILE *fp);
+  std::string more_coefficients(int type) const;
+  void require_lasting_types() const;
   void choose_instructions();
   void measure_particles();
   void require_energy(double energy, const std::string &text, const std::string &where) const;

@@ -113,6 +113,15 @@ template <class Model> class PairContactOf : public PairContact {
     return shape_from(semi_axes, type).has_value();
   }
   std::string shape_rule() const override { return Model::SHAPE_RULE; }
+  bool take_form(int type, const FormNumbers &numbers) override
+  {
+    const auto found = Model::Form::from(numbers, domain->dimension);
+    forms.resize(atom->ntypes + 1);
+    if (found || numbers.empty()) forms[type] = found;
+    return found.has_value();
+  }
+  std::string form_name() const override { return Model::FORM; }
+  std::string form_rule() const override { return Model::FORM_RULE; }
   bool turns(const Vec<3> &semi_axes, int type) const override
   {
     const auto shape = *shape_from(semi_axes, type);
@@ -149,7 +158,8 @@ template <class Model> class PairContactOf : public PairContact {
 
   std::optional<typename Model::Shape> shape_from(const Vec<3> &semi_axes, int type) const
   {
-    return Model::shape_from(semi_axes, exponent(type));
+    const std::optional<typename Model::Form> &form = forms[type];
+    return form ? Model::shape_from(semi_axes, *form) : std::nullopt;
   }
 
   typename Model::Shape required_shape(const Vec<3> &semi_axes, int type) const
@@ -163,6 +173,8 @@ template <class Model> class PairContactOf : public PairContact {
   {
     return Model::law(k_e[atom->type[i]][atom->type[j]], sides, !disabled.contact);
   }
+
+  std::vector<std::optional<typename Model::Form>> forms;  // per type
 
   template <int D> struct Bodies {
     using Pose = typename BodiesOf<Model, D>::Pose;
@@ -420,7 +432,7 @@ template <class Model> class PairContactOf : public PairContact {
   double run_began() const { return timer->get_wall(LAMMPS_NS::Timer::TOTAL); }
 
   /// Placeholder for an atom of other styles in a hybrid one, of which no pair is listed here.
-  static typename Model::Shape ball() { return *Model::shape_from({{1.0, 1.0, 1.0}}, 1.0); }
+  static typename Model::Shape ball() { return *Model::shape_from({{1.0, 1.0, 1.0}}, {}); }
 
   /// Returns whether any has changed. The results of the set-up of the run must remain valid.
   template <int D> bool read_shapes()
@@ -429,7 +441,11 @@ template <class Model> class PairContactOf : public PairContact {
     bodies.begin_shapes(static_cast<std::size_t>(n_all()));
     packs_take_all = !disabled.contact;
     std::optional<typename Model::Shape> of_first;
+    const std::vector<int> alike = first_types_of_forms();
     std::uint64_t checksum = 0;
+    for (int type = 1; type <= atom->ntypes; ++type) {
+      for (const double number : form(type)) checksum = mixed(checksum, number);
+    }
     for (int i = 0; i < n_all(); ++i) {
       if (!handles(i)) {
         bodies.set_shape(i, ball(), {1.0, 1.0, 1.0, 1.0});
@@ -440,7 +456,8 @@ template <class Model> class PairContactOf : public PairContact {
       require_same_bound(i, semi_axes);
       const typename Model::Shape shape = *shape_from(semi_axes, atom->type[i]);
       if (!any_turns && Model::template turns<D>(shape)) stop_at_unexpected_turns(i);
-      const ShapeNumbers numbers{semi_axes[0], semi_axes[1], semi_axes[2], exponent(atom->type[i])};
+      const ShapeNumbers numbers{semi_axes[0], semi_axes[1], semi_axes[2],
+                                 static_cast<double>(alike[atom->type[i]])};
       bodies.set_shape(i, shape, numbers);
       for (const double number : numbers) checksum = mixed(checksum, number);
       if constexpr (PacksOf<Model, D>::EXIST) {
@@ -450,6 +467,18 @@ template <class Model> class PairContactOf : public PairContact {
     }
     shapes_read = run_began();
     return std::exchange(shapes, checksum) != checksum;
+  }
+
+  /// For each type, the first one of the same form.
+  std::vector<int> first_types_of_forms() const
+  {
+    std::vector<int> first_one(atom->ntypes + 1, 0);
+    for (int type = 1; type <= atom->ntypes; ++type) {
+      int same = 1;
+      while (form(same) != form(type)) ++same;
+      first_one[type] = same;
+    }
+    return first_one;
   }
 
   /// One step of a checksum over numbers in order.

@@ -31,6 +31,7 @@ from .front.shearing import shear as shear
 from .lammps.session import Session as Session
 from .measures.nonaffine import Nonaffine as Nonaffine
 from .packing import Box as Box
+from .shapes.named import Clumps as Clumps
 from .shapes.named import Dimers as Dimers
 from .shapes.named import Spherocylinders as Spherocylinders
 from .shapes.named import Superellipsoids as Superellipsoids

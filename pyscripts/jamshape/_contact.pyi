@@ -38,13 +38,13 @@ class _Shape:
     director: _Ints
     @overload
     def __init__(
-        self, diameters: _Reals, exponent: _Reals, dimension: int, k_e: float, sides: int
+        self, diameters: _Reals, form: _Reals, dimension: int, k_e: float, sides: int
     ) -> None: ...
     @overload
     def __init__(
         self,
         diameters: _Reals,
-        exponent: _Reals,
+        form: _Reals,
         dimension: int,
         k_e: _Reals,
         species: _Ints,
@@ -112,6 +112,8 @@ class _Shape:
         self, column: _Ints, rotation_length: _Reals, turning_radius: _Reals
     ) -> LocalEnergyModel: ...
 
+def union_moments(discs: _Reals, dimension: int) -> _Reals: ...
+def boundary_arcs(discs: _Reals) -> _Reals: ...
 def find_rattlers(
     n_particles: int, dimension: int, pairs: _Ints, normals: _Reals, flat: _Bools
 ) -> _Bools: ...

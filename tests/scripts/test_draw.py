@@ -36,13 +36,15 @@ def mixture(shape, dimension):
     rng, n = np.random.default_rng(1), n_side**dimension
     grid = np.stack(np.meshgrid(*[np.arange(n_side)] * dimension), axis=-1).reshape(-1, dimension)
     species = 1 + np.arange(n) % 2
-    diameters, exponent = np.empty((n, 3)), np.empty(n)
+    diameters, form = np.empty((n, 3)), None
     for kind, size in ((1, 1.0), (2, 1.3)):
         known = {p.name: p.default for p in SHAPES[shape].parameters}
         known |= {"w2": 2.0} if "w2" in known else {}
         known |= {"alpha": 1.0 * kind} if "alpha" in known else {}
         own = species == kind
-        diameters[own], exponent[own] = SHAPES[shape].sizes(known, np.full(own.sum(), size))
+        diameters[own], its = SHAPES[shape].sizes(known, np.full(own.sum(), size))
+        form = np.empty((n, its.shape[1])) if form is None else form
+        form[own] = its
     q = rng.normal(size=(n, 4))
     q /= np.linalg.norm(q, axis=1, keepdims=True)
     edge = 1.02 * diameters.max()
@@ -50,7 +52,7 @@ def mixture(shape, dimension):
         position=edge * grid,
         orientation=q if dimension == 3 else rng.uniform(0, 7, n),
         diameters=diameters,
-        exponent=exponent,
+        form=form,
         species=species,
         id=np.arange(1, n + 1),
         box=Box(np.zeros(dimension), np.full(dimension, edge * n_side)),

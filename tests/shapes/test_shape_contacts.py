@@ -228,7 +228,7 @@ def test_particles_at_one_place_are_named(case):
     packing = scattered(case, 4)
     position = packing.position.copy()
     position[2] = position[0]
-    names = ("orientation", "diameters", "exponent")
+    names = ("orientation", "diameters", "form")
     alike = {name: np.repeat(getattr(packing, name)[:1], 4, axis=0) for name in names}
     packing = packing.with_(position=position, id=np.array([7, 1, 3, 2]), **alike)
     sentence = f"the {packing.compiled().core} of particles 7 and 3 cross"

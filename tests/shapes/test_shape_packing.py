@@ -242,7 +242,7 @@ def test_files_hold_packings_to_the_last_bit(case, made, tmp_path):
     again = read_packing(tmp_path / "copy.h5")
     for one, other in zip(packing.poses(), again.poses(), strict=True):
         np.testing.assert_array_equal(one, other)
-    for name in ("diameters", "exponent", "species", "id", "image"):
+    for name in ("diameters", "form", "species", "id", "image"):
         np.testing.assert_array_equal(getattr(again, name), getattr(packing, name))
     assert again.shape_style == packing.shape_style == case.shape
     assert read_attributes(tmp_path / "copy.h5") == {"note": "a copy"}

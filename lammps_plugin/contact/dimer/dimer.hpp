@@ -1,6 +1,7 @@
 #pragma once
 
 #include "contact/along_x.hpp"
+#include "contact/clump/disc_bond.hpp"
 #include "contact/compiled_once.hpp"
 #include "contact/contact.hpp"
 #include "contact/harmonic.hpp"
@@ -62,75 +63,19 @@ struct DimerLaw {
 
 /// Contact of two dimers: V is the sum of harmonic energies of the overlaps 1 - r/d of up to four
 /// pairs of discs, each a bond along the line of centres.
-template <int D, class S> class DimerContact {
- public:
-  using Found = Contact<D, S, 4>;
-
-  DimerContact(const DimerBody<D, S> &body_i, const DimerBody<D, S> &body_j, const DimerLaw &of) :
-      i(body_i), j(body_j), r(body_i.centre - body_j.centre), law(of.harmonic),
-      reach(body_i.radius + body_j.radius)
-  {
-  }
-
-  Found evaluate() const
-  {
-    Found contact = without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::APART);
-    for (int a = 0; a < 2; ++a) {
-      const Vec<D, S> arm_i = to_disc(i, a);
-      for (int b = 0; b < 2; ++b) add_bond(contact, arm_i, to_disc(j, b));
-    }
-    return contact;
-  }
-
- private:
-  const DimerBody<D, S> &i, &j;
-  Vec<D, S> r;
-  Harmonic law;
-  double reach;
-
-  /// Adds the bond of the discs at these arms if they touch; coinciding centres give no bond.
-  void add_bond(Found &contact, const Vec<D, S> &arm_i, const Vec<D, S> &arm_j) const
-  {
-    if (contact.status == ContactStatus::CROSSING) return;
-    const Vec<D, S> apart = r + arm_i - arm_j;
-    const ValueOf<S> square = norm_sq(values_of(apart)), d = reach;
-    if (!(square < d * d)) return;
-    if (square <= COINCIDENT * d * COINCIDENT * d) {
-      contact = without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::CROSSING);
-      return;
-    }
-    contact.status = ContactStatus::TOUCHING;
-    fill(contact.bond[contact.n_bonds++], arm_i, arm_j, apart);
-    const Bond<D, S> &bond = contact.bond[contact.n_bonds - 1];
-    contact.energy += bond.energy;
-    contact.force += bond.force;
-    contact.torque_i += cross(arm_i, bond.force);
-    contact.torque_j -= cross(arm_j, bond.force);
-  }
-
-  void fill(Bond<D, S> &bond, const Vec<D, S> &arm_i, const Vec<D, S> &arm_j,
-            const Vec<D, S> &apart) const
-  {
-    const S distance = norm(apart), overlap = (reach - distance) / reach;
-    bond.normal = (1.0 / distance) * apart;
-    // In dual numbers the slope of the law is held constant: `own_stiffness` accounts for it.
-    bond.force = (law.energy_gradient(constant(overlap)) / reach) * bond.normal;
-    bond.arm_i = arm_i - (i.radius / reach * distance) * bond.normal;  // inside the overlap
-    bond.lever_i = cross(arm_i, bond.normal);
-    bond.lever_j = -cross(arm_j, bond.normal);
-    bond.distance = distance;
-    bond.reach = reach;
-    bond.energy = law.energy(overlap);
-    bond.stiffness = bond.own_stiffness = law.energy_hessian(overlap) / (reach * reach);
-    bond.coupling = 0.0;
-    bond.on_side_i = bond.on_side_j = false;
-  }
-};
-
 template <int D, class S>
 Contact<D, S, 4> contact_of(const DimerBody<D, S> &i, const DimerBody<D, S> &j, const DimerLaw &law)
 {
-  return DimerContact<D, S>(i, j, law).evaluate();
+  Contact<D, S, 4> contact = without_bonds<D, S, 4>(ContactStatus::APART);
+  const Vec<D, S> r = i.centre - j.centre;
+  for (int a = 0; a < 2; ++a) {
+    const Vec<D, S> arm_i = to_disc(i, a);
+    for (int b = 0; b < 2; ++b) {
+      const Vec<D, S> arm_j = to_disc(j, b);
+      add_disc_bond(contact, {arm_i, arm_j, r + arm_i - arm_j, i.radius, j.radius}, law.harmonic);
+    }
+  }
+  return contact;
 }
 
 /// Interface of a shape (see SpherocylinderModel).

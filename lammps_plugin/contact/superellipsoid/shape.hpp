@@ -68,13 +68,25 @@ struct Superellipsoid {
   }
 };
 
-/// Returns nothing unless the semi-axes are positive lengths and the particle is strictly convex.
+/// The exponent, 1 if it is not given.
+struct SuperellipsoidForm {
+  double p = 1.0;
+
+  /// Returns nothing unless particles of this exponent are strictly convex.
+  static std::optional<SuperellipsoidForm> from(const FormNumbers &numbers, int /*dimension*/)
+  {
+    if (numbers.empty()) return SuperellipsoidForm{};
+    const bool is_one = numbers.size() == 1 && numbers[0] > 0.5 && std::isfinite(numbers[0]);
+    return is_one ? std::optional<SuperellipsoidForm>({numbers[0]}) : std::nullopt;
+  }
+};
+
+/// Returns nothing unless the semi-axes are positive lengths.
 inline std::optional<Superellipsoid> superellipsoid_from(const Vec<3> &semi_axes, double p)
 {
   for (int k = 0; k < 3; ++k) {
     if (!(semi_axes[k] > 0.0) || !std::isfinite(semi_axes[k])) return std::nullopt;
   }
-  if (!(p > 0.5) || !std::isfinite(p)) return std::nullopt;
   return Superellipsoid{semi_axes, p};
 }
 

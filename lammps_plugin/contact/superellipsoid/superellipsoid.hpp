@@ -197,9 +197,14 @@ struct SuperellipsoidModel {
   static Law law(double epsilon, Sides, bool shortcuts = true) { return {epsilon, shortcuts}; }
   static double k_e(const Law &law) { return law.epsilon; }
 
-  static std::optional<Shape> shape_from(const Vec<3> &semi_axes, double exponent)
+  using Form = SuperellipsoidForm;
+  static constexpr const char *FORM = "p";
+  static constexpr const char *FORM_RULE =
+      "a finite number above 0.5: particles of other exponents are not convex";
+
+  static std::optional<Shape> shape_from(const Vec<3> &semi_axes, const Form &form)
   {
-    return superellipsoid_from(semi_axes, exponent);
+    return superellipsoid_from(semi_axes, form.p);
   }
 
   template <int D> static Shortcut shortcut(const Shape &shape)

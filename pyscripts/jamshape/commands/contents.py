@@ -126,7 +126,7 @@ def _of_packing(packing: PackingLike) -> dict[str, Any]:
     rows = []
     for number in numbers:
         own = kinds.of == number
-        row = packing.diameters[own][0], float(packing.exponent[own][0])
+        row = packing.diameters[own][0], packing.form[own][0]
         parameters, size = packing.shape.parameters_of(*row)
         rows.append({**parameters, "size": size, "count": int(own.sum())})
     found = {"shape": packing.shape_style, "dimension": packing.dimension, "n": packing.n}

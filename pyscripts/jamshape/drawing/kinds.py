@@ -45,8 +45,8 @@ def kinds_of(packing: Packing) -> Kinds:
     Kinds
         Without labels, with each particle a kind, if there are more than `MOST`.
     """
-    rows = np.column_stack([packing.diameters, packing.exponent])
-    rounded = np.round(rows / rows.max(axis=0), _DIGITS)
+    rows = np.column_stack([packing.diameters, packing.form])
+    rounded = np.round(rows / np.maximum(np.abs(rows).max(axis=0), np.finfo(float).tiny), _DIGITS)
     first, of = np.unique(rounded, axis=0, return_index=True, return_inverse=True)[1:]
     if len(first) > MOST:
         first, of = np.unique(packing.species, return_index=True, return_inverse=True)[1:]
@@ -63,7 +63,7 @@ def kinds_of(packing: Packing) -> Kinds:
 
 def _named(packing: Packing, own: BoolArray) -> tuple[str, str]:
     """Return labels of parameters and sizes for the particles of one kind."""
-    shape, rows = packing.shape, zip(packing.diameters[own], packing.exponent[own], strict=True)
+    shape, rows = packing.shape, zip(packing.diameters[own], packing.form[own], strict=True)
     known = [shape.parameters_of(*row) for row in rows]
     sizes = np.array([size for _, size in known])
     low, high = sizes.min(), sizes.max()

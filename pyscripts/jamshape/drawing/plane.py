@@ -69,9 +69,9 @@ def images(position: FloatArray, reach: FloatArray, box: Box) -> Images:
 def outlines(packing: Packing, at: Images) -> list[FloatArray]:
     """Trace particles: M polygons (K, 2); equal shapes share one."""
     corners = int(np.clip(_CORNERS / np.sqrt(packing.n + 1), _FEWEST, _MOST))
-    rows = np.column_stack([packing.diameters, packing.exponent])
+    rows = np.column_stack([packing.diameters, packing.form])
     kinds, kind = np.unique(rows, axis=0, return_inverse=True)
-    bodies = [packing.shape.outline(row[:3], float(row[3]), corners) for row in kinds]
+    bodies = [packing.shape.outline(row[:3], row[3:], corners) for row in kinds]
     axes = np.stack([packing.body_axes(0), packing.body_axes(1)], axis=1)
     of = zip(at.owner.tolist(), at.center, strict=True)
     return [bodies[kind.ravel()[i]] @ axes[i] + center for i, center in of]

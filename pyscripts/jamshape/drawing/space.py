@@ -84,10 +84,10 @@ def faces_of(
     if centers is None:
         centers = packing.box.lo + packing.box.wrapped(packing.position)[0]
     turned = np.stack([packing.body_axes(k) for k in range(3)], axis=1)
-    kinds = np.column_stack([packing.diameters, packing.exponent])
+    kinds = np.column_stack([packing.diameters, packing.form])
     found = []
     for kind in np.unique(kinds, axis=0):
-        mesh = packing.shape.surface(kind[:3], float(kind[3]), level)
+        mesh = packing.shape.surface(kind[:3], kind[3:], level)
         normals = mean_normals(mesh)
         for body in np.flatnonzero((kinds == kind).all(axis=1)):
             out = normals @ turned[body]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.packing import Box, Packing
 
-PARTICLES = ("position", "orientation", "diameters", "exponent", "species", "id", "image")
+PARTICLES = ("position", "orientation", "diameters", "species", "id", "image")
 PARTICLE_RESTS = ("position_rest", "orientation_rest")
 
 Fields = dict[str, NDArray[Any]]
@@ -21,7 +21,8 @@ _INT32 = np.iinfo(np.int32)
 
 def particle_fields(packing: Packing, *, rests: bool) -> Fields:
     """Return arrays with a row for each particle."""
-    return {name: getattr(packing, name) for name in PARTICLES + PARTICLE_RESTS * rests}
+    form = "form" if packing.form.shape[1] > 1 else "exponent"
+    return {name: getattr(packing, name) for name in (*PARTICLES, form, *PARTICLE_RESTS * rests)}
 
 
 def box_fields(packing: Packing, *, rests: bool, tilted: bool) -> Fields:
@@ -76,7 +77,7 @@ class Alike(NamedTuple):
 
 
 def alike(packing: Packing, *more: NDArray[Any]) -> Alike:
-    """Group particles with equal diameters, exponent and further (N,) values."""
-    rows = np.column_stack([*more, packing.diameters, packing.exponent])
+    """Group particles with equal diameters, form and further (N,) values."""
+    rows = np.column_stack([*more, packing.diameters, packing.form])
     _, first, of = np.unique(rows, axis=0, return_index=True, return_inverse=True)
     return Alike(first, of.ravel())

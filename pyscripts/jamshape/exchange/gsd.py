@@ -185,7 +185,7 @@ class _Body(NamedTuple):
 
     style: str
     diameters: tuple[float, ...]
-    exponent: float
+    form: tuple[float, ...]
     is_round: bool
     level: int
 
@@ -193,7 +193,7 @@ class _Body(NamedTuple):
     def of(cls, packing: Packing, i: int, level: int) -> _Body:
         sizes = tuple(packing.diameters[i].tolist())
         is_round = bool(packing.is_round[i])
-        return cls(packing.shape_style, sizes, float(packing.exponent[i]), is_round, level)
+        return cls(packing.shape_style, sizes, tuple(packing.form[i].tolist()), is_round, level)
 
 
 @lru_cache(maxsize=4096)  # frames of a run have the same particles
@@ -202,8 +202,9 @@ def _type_shape(body: _Body) -> dict[str, Any]:
     if body.is_round:
         return {"type": "Sphere", "diameter": body.diameters[0]}
     shape, diameters = shape_named(body.style), np.array(body.diameters)
-    known = _described(shape.solid(diameters, body.exponent))
-    return known or _mesh(shape.surface(diameters, body.exponent, body.level))
+    form = np.array(body.form)
+    known = _described(shape.solid(diameters, form))
+    return known or _mesh(shape.surface(diameters, form, body.level))
 
 
 @singledispatch
@@ -222,7 +223,7 @@ def _(solid: Superquadric) -> dict[str, Any]:
 @_described.register
 def _(solid: Balls) -> dict[str, Any]:
     centers = solid.centers.tolist()
-    diameters = [2 * solid.radius] * len(centers)
+    diameters = (2 * solid.radii).tolist()
     return {"type": "SphereUnion", "diameters": diameters, "centers": centers}
 
 

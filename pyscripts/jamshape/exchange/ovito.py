@@ -136,10 +136,10 @@ def from_ovito(data: Any) -> Packing:
             "edges": lengths.edges,
             "tilt": lengths.tilt,
         }
-        names = ("orientation", "diameters", "exponent", "species", "image", *PARTICLE_RESTS)
+        names = ("orientation", "diameters", "exponent", "form", "species", "image", *PARTICLE_RESTS)
         for name in names:
             title = _PREFIX + name.replace("_", " ")
-            if name not in PARTICLE_RESTS or title in particles:
+            if name not in (*PARTICLE_RESTS, "exponent", "form") or title in particles:
                 fields[name] = np.asarray(particles[title][...])
         known = data.attributes
         for field, titles in _rests_of_box(D).items():
@@ -203,8 +203,8 @@ def _add_cell(data: Any, packing: Packing) -> None:
 def _glyphs(packing: Packing) -> tuple[list[_Glyph], IntArray]:
     """Return the glyph of each body, and the index of the body of each particle."""
     bodies = alike(packing)
-    rows = zip(packing.diameters[bodies.first], packing.exponent[bodies.first], strict=True)
-    return [_glyph(packing.shape.solid(d, float(p))) for d, p in rows], bodies.of
+    rows = zip(packing.diameters[bodies.first], packing.form[bodies.first], strict=True)
+    return [_glyph(packing.shape.solid(d, form)) for d, form in rows], bodies.of
 
 
 def _add_bodies(particles: Any, packing: Packing) -> None:
@@ -233,8 +233,8 @@ class _Known(NamedTuple):
 
 def _known_sizes(packing: Packing) -> _Known:
     bodies = alike(packing)
-    rows = zip(packing.diameters[bodies.first], packing.exponent[bodies.first], strict=True)
-    found = [packing.shape.parameters_of(d, float(p)) for d, p in rows]
+    rows = zip(packing.diameters[bodies.first], packing.form[bodies.first], strict=True)
+    found = [packing.shape.parameters_of(d, form) for d, form in rows]
     names = [parameter.name for parameter in packing.shape.parameters]
     parameters = np.array([[of[name] for name in names] for of, _ in found])
     sizes = np.array([size for _, size in found])
@@ -250,7 +250,7 @@ def _add_types(particles: Any, packing: Packing, vis: Any) -> None:
     types = types.ravel()
     listed = particles.create_property("Particle Type", data=types + 1)
     colors = of_kinds(packing, np.zeros(packing.n, bool)).rgb
-    glyph = _glyph(packing.shape.solid(packing.diameters[0], float(packing.exponent[0])))
+    glyph = _glyph(packing.shape.solid(packing.diameters[0], packing.form[0]))
     for k, i in enumerate(first.tolist()):
         own = listed.add_type_id(k + 1, particles)
         sizes = known.size[types == k]
@@ -268,7 +268,7 @@ def _add_types(particles: Any, packing: Packing, vis: Any) -> None:
 
 def _mesh(packing: Packing, i: int, size: float) -> Any:
     """Make the mesh of a particle in units of its size."""
-    surface = packing.shape.surface(packing.diameters[i], float(packing.exponent[i]), _LEVEL)
+    surface = packing.shape.surface(packing.diameters[i], packing.form[i], _LEVEL)
     mesh = tool("ovito.data", "ovito").TriangleMesh()
     mesh.set_vertices(surface.vertices / size)
     mesh.set_faces(surface.triangles)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 _CHECKPOINT = "checkpoint"  # group of a file that is not finished
 
-_OF_PARTICLES = ("dimension", "shape_style", "id", "species", "diameters", "exponent", "law")
+_OF_PARTICLES = ("dimension", "shape_style", "id", "species", "diameters", "form", "law")
 
 
 @dataclass

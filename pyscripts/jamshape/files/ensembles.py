@@ -124,9 +124,9 @@ def number(attributes: Mapping[str, Any], name: str, who: str, expected: str) ->
 
 def system_of(attributes: Mapping[str, Any], shape: str, dimension: int) -> System:
     """Return the system of a packing, from its attributes, shape style and dimension."""
-    names = [parameter.name for parameter in shape_named(shape).parameters]
-    told = set(names) <= attributes.keys()
-    known = tuple((name, float(attributes[name])) for name in names if told)
+    its = {parameter.name: parameter for parameter in shape_named(shape).parameters}
+    told = its.keys() <= attributes.keys()
+    known = tuple((name, one.read(attributes[name])) for name, one in its.items() if told)
     kinds = str(attributes.get("kinds", ""))
     protocol = str(attributes.get("protocol", ""))
     sweeps = int(attributes.get("n_sweeps", 0))

@@ -19,6 +19,7 @@ r"""Packings and runs as H5MD 1.1 files; a packing is a run with one frame.
         species, id     (N,)
         diameters       (N, 3), the shape columns of LAMMPS (not in H5MD)
         exponent        (N,), for shapes that have one (not in H5MD)
+        form            (N, K), for shapes given by further numbers (not in H5MD)
         half_length, radius (N,), A and R of the others, as used for contacts (not in H5MD)
     /observables/NAME   {step, time, value (T', ...)}, each sampled at its own steps; those with the same steps
                         and times share them by hard links

@@ -53,7 +53,9 @@ from jamshape.shapes.shape import Stiffness, stiffness_of, stiffness_text, stiff
 from jamshape.shapes.table import SHAPES
 
 _TITLE = "LAMMPS data file by jamshape"
-_EXPONENT_COMMENT = "exponent="
+_EXPONENT_COMMENT, _FORM_COMMENT = "exponent=", "form="
+_FORM = "# form "  # and its number, a colon and numbers, in one line or several
+_NUMBERS_IN_LINE = 8
 _POSITION = ("x", "y", "z")
 # Positions in dumps: wrapped or not, and in units of the box.
 _POSITIONS = (_POSITION, ("xu", "yu", "zu"), ("xs", "ys", "zs"), ("xsu", "ysu", "zsu"))
@@ -134,6 +136,7 @@ def write_data(path: PathLike, packing: Packing, density: float = 1.0) -> None:
     ellipsoids = np.column_stack([packing.id, packing.diameters, packing.quaternions])
     with replacing(path) as temporary, temporary.open("w", encoding="ascii") as file:
         file.write(_header_text(packing))
+        file.write(_forms_text(packing) if packing.shape.has_form else "")
         file.write(_pairs_text(packing))
         file.write("\nAtoms # ellipsoid\n\n")
         np.savetxt(file, atoms, fmt=["%d"] * 3 + ["%.17g"] * 4 + ["%d"] * 3)
@@ -142,6 +145,9 @@ def write_data(path: PathLike, packing: Packing, density: float = 1.0) -> None:
         if packing.shape.has_exponent:
             row += [f"# {_EXPONENT_COMMENT}%.17g"]
             ellipsoids = np.column_stack([ellipsoids, packing.exponent])
+        if packing.shape.has_form:
+            row += [f"# {_FORM_COMMENT}%d"]
+            ellipsoids = np.column_stack([ellipsoids, 1 + _forms(packing)[1]])
         np.savetxt(file, ellipsoids, fmt=row)
 
 
@@ -165,6 +171,22 @@ def write_dump(path: PathLike, packings: Packing | Iterable[Packing]) -> None:
             _write_frame(file, packing)
 
 
+def _forms(packing: Packing) -> tuple[FloatArray, IntArray]:
+    """Return different forms (k, K) and the row of each particle (N,)."""
+    forms, of = np.unique(packing.form, axis=0, return_inverse=True)
+    return forms, of.ravel()
+
+
+def _forms_text(packing: Packing) -> str:
+    """Return comments with the different forms, in lines that LAMMPS can read over."""
+    lines = []
+    for number, form in enumerate(_forms(packing)[0], 1):
+        words = [f"{x:.17g}" for x in form]
+        for k in range(0, len(words), _NUMBERS_IN_LINE):
+            lines.append(f"# form {number}: {' '.join(words[k : k + _NUMBERS_IN_LINE])}")
+    return "\n".join(["", *lines, ""])
+
+
 def _write_frame(file: TextIO, packing: Packing) -> None:
     lo, hi = (np.array([*ends, z][:3]) for ends, z in zip(packing.box.bounds, PLANE, strict=True))
     bounds, boundary = np.column_stack([lo, hi]), "pp pp pp"
@@ -177,6 +199,8 @@ def _write_frame(file: TextIO, packing: Packing) -> None:
     columns |= dict(zip(_PROPERTIES, [*packing.quaternions.T, *packing.diameters.T], strict=True))
     if packing.shape.has_exponent:
         columns |= {"exponent": packing.exponent, **dict.fromkeys(_ROUNDNESS, 1 / packing.exponent)}
+    if packing.shape.has_form:
+        columns |= flat({"form": packing.form})
     columns = flat(packing.columns) | columns
     columns = {name: columns[name] for name in sorted(columns, key=_place_in_row)}
     file.write(f"ITEM: TIME\n{packing.time:.17g}\n" if packing.time else "")
@@ -380,10 +404,11 @@ def _packing(path: PathLike, frame: _Frame, wanted: Wanted) -> Packing:
     def stack(names: Sequence[str]) -> FloatArray:
         return np.column_stack([frame.columns[name] for name in names])
 
-    exponent = _exponent(frame.columns)
+    exponent, others = _exponent(frame.columns), dict(frame.others)
+    form = others.pop("form", frame.columns.get("form", np.empty((0, 0))))
     quaternion = stack(_QUATERNION)
     there = Geometry(stack(_POSITION), quaternion, stack(_DIAMETERS), frame.bounds, frame.tilt)
-    said = replace(frame.said, has_exponent=len(exponent) > 0)
+    said = replace(frame.said, has_exponent=len(exponent) > 0, has_form=len(form) > 0)
     dimension, shape, law = meaning = meaning_of(path, there, said, wanted)
     quaternion = meaning.turned(quaternion)
     lo, hi = frame.bounds[:dimension].T
@@ -398,10 +423,11 @@ def _packing(path: PathLike, frame: _Frame, wanted: Wanted) -> Packing:
         box=Box(lo=lo, edges=hi - lo, tilt=frame.tilt[: 1 if dimension == 2 else 3]),
         shape_style=shape.name,
         exponent=exponent,
+        form=form,
         law=law,
         step=frame.step,
         time=frame.time,
-        columns=frame.others,
+        columns=others,
     )
     _require_closed(path, packing, frame)
     return packing
@@ -530,6 +556,7 @@ def _data_frame(text: str) -> _Frame:
         columns |= ellipsoids
     said = replace(_said(text, sections, columns), digits=_digits(atom_rows, names))
     others: dict[str, NDArray[Any]] = {"q": columns["q"]} if "q" in columns else {}
+    others |= _form(text, columns)
     others |= {"mol": _whole(columns["mol"])} if "mol" in columns else {}
     return _Frame(columns, *_bounds(header), said, others=others)
 
@@ -626,11 +653,33 @@ def _ellipsoids(rows: Sequence[str], comments: Sequence[str]) -> dict[str, Float
             )
             raise ValueError(msg)
         return found | {"exponent": one / 2}
-    told = [comment.removeprefix(_EXPONENT_COMMENT) for comment in comments]
-    if not all(comment.startswith(_EXPONENT_COMMENT) for comment in comments):
-        return _columns(rows, _ELLIPSOIDS, _ELLIPSOIDS)
-    names = (*_ELLIPSOIDS, *_EXPONENT)
-    return _columns([f"{a} {b}" for a, b in zip(rows, told, strict=True)], names, names)
+    for beginning, name in ((_EXPONENT_COMMENT, "exponent"), (_FORM_COMMENT, "form")):
+        if all(comment.startswith(beginning) for comment in comments):
+            told = [comment.removeprefix(beginning) for comment in comments]
+            names = (*_ELLIPSOIDS, name)
+            return _columns([f"{a} {b}" for a, b in zip(rows, told, strict=True)], names, names)
+    return _columns(rows, _ELLIPSOIDS, _ELLIPSOIDS)
+
+
+def _form(text: str, columns: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Return the forms (N, K) of particles, if the file has them: from comments of ours, or coefficients of types."""
+    forms: dict[int, list[float]] = {}
+    for line in text.splitlines() if "form" in columns else ():
+        if line.startswith(_FORM):
+            number, _, words = line.removeprefix(_FORM).partition(":")
+            forms.setdefault(int(number), []).extend(map(float, words.split()))
+    return _form_rows(forms, columns["form"]) if forms else {}
+
+
+def _form_rows(forms: Mapping[int, Sequence[float]], of: FloatArray) -> dict[str, FloatArray]:
+    """Return forms (N, K) by their numbers (N,), shorter ones with zeros behind."""
+    unknown = set(of.tolist()) - forms.keys()
+    if unknown:
+        msg = f"a particle has form {min(unknown):g}, expected one of the {len(forms)} forms that the file lists"
+        raise ValueError(msg)
+    width = max(map(len, forms.values()))
+    rows = {number: [*row, *[0.0] * (width - len(row))] for number, row in forms.items()}
+    return {"form": np.array([rows[int(number)] for number in of])}
 
 
 def _said(text: str, sections: Mapping[str, _Section], columns: dict[str, FloatArray]) -> Said:
@@ -662,6 +711,9 @@ def _of_pairs(
     if SHAPES[shape].has_exponent and "exponent" not in columns:
         p = {kind: float(row[n_types + 1]) for kind, row in own.items() if len(row) > n_types + 1}
         columns["exponent"] = np.array([p.get(int(kind), 1.0) for kind in columns["type"]])
+    if SHAPES[shape].has_form:
+        forms = {kind: [float(x) for x in row[n_types + 1 :]] for kind, row in own.items()}
+        columns |= _form_rows(forms, columns["type"])
     return Said(shape=shape, law={"k_e": k_e})
 
 

@@ -43,7 +43,7 @@ from jamshape.files.origin import origin
 from jamshape.files.vocabulary import FORMAT_VERSION, require_format
 from jamshape.packing import Box, Packing
 from jamshape.packing.columns import MOST
-from jamshape.shapes.shape import Interaction
+from jamshape.shapes.shape import MOST_NUMBERS, Interaction
 
 if TYPE_CHECKING:
     import h5py
@@ -178,7 +178,7 @@ def write_particles(group: h5py.Group, frames: Sequence[Packing]) -> None:
     first = frames[0]
     set_attributes(group, {"shape_style": first.shape_style, **first.law._asdict()})
     # Half lengths and radii reproduce overlaps without the rounding of 2(A + R).
-    more = ("exponent",) if first.shape.has_exponent else ("half_length", "radius")
+    more = first.shape.stored
     for name in ("species", "id", "diameters", *more):
         put(group, name, getattr(first, name))
     form = functools.reduce(Form.joined, map(Form.of, frames))
@@ -245,14 +245,15 @@ def read_frame(file: h5py.File, frame: int) -> Packing:
         _require_most(rows, rows.shape[1:], n)
         return rows[frame]
 
-    def fixed(name: str) -> Any:
+    def fixed(name: str, most: int = _MOST_COLUMNS) -> Any:
         values = require_dataset(file, f"particles/all/{name}")
-        _require_most(values, values.shape, n)
+        _require_most(values, values.shape, n, most)
         return values[()]
 
     fields = {name: fixed(name) for name in ("diameters", "species", "id")}
-    if has_item(file, "particles/all/exponent"):
-        fields["exponent"] = fixed("exponent")
+    for name, most in (("exponent", 1), ("form", MOST_NUMBERS)):
+        if has_item(file, f"particles/all/{name}"):
+            fields[name] = fixed(name, most)
     fields |= {name: row(f"{name}/value") for name in ("position", "orientation", "image")}
     for name, element in RESTS.items():
         if has_item(file, f"particles/all/{element}"):
@@ -290,9 +291,11 @@ def _read_columns(file: h5py.File, frame: int, n: int) -> dict[str, NDArray[Any]
 _MOST_COLUMNS = 4  # numbers of a particle in one array, or of a row of a box
 
 
-def _require_most(dataset: Any, shape: tuple[int, ...], n: int) -> None:
+def _require_most(
+    dataset: Any, shape: tuple[int, ...], n: int, most: int = _MOST_COLUMNS
+) -> None:
     """Refuse an array larger than n particles need, before it is read."""
-    if math.prod(shape) > max(n, _MOST_COLUMNS) * _MOST_COLUMNS:
+    if math.prod(shape) > max(n, _MOST_COLUMNS) * most:
         msg = (
             f"{dataset.file.filename}: {dataset.name} has shape {shape}, expected numbers of {n} particles;"
             " write it again"

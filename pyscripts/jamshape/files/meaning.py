@@ -48,6 +48,8 @@ class Said:
     """k_e and sides, if stated."""
     has_exponent: bool = False
     """Whether the file has exponents."""
+    has_form: bool = False
+    """Whether it has forms, as of clumps."""
     digits: int = 0
     """Largest number of significant digits of a coordinate; 0 if not counted."""
     is_scaled: bool = False
@@ -147,10 +149,15 @@ def meaning_of(path: PathLike, there: Geometry, said: Said, wanted: Wanted) -> M
         raise ValueError(msg)
     dimension, why = _dimension(there, wanted.dimension or said.dimension)
     name = wanted.shape or said.shape
-    # Only one shape has exponents.
-    able = [shape.name for shape in SHAPES.values() if shape.has_exponent >= said.has_exponent]
+    able = [
+        shape.name
+        for shape in SHAPES.values()
+        if shape.has_exponent >= said.has_exponent and shape.has_form == said.has_form
+    ]
     if name and shape_named(name).name not in able:
-        msg = f"the file has exponents, which no {name} has, expected one of {', '.join(able)}"
+        has = "exponents" if said.has_exponent else "forms" if said.has_form else "no forms"
+        which = f"which a {name} needs" if has == "no forms" else f"which no {name} has"
+        msg = f"the file has {has}, {which}, expected one of {', '.join(able)}"
         raise ValueError(msg)
     if name and said.is_ours:
         found = Fitted(name, there.diameters, np.zeros(len(there.diameters), np.int64))

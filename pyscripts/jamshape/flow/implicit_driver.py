@@ -117,7 +117,7 @@ class ImplicitDriver:
         """Return the present state."""
         flow = self._flow
         packing = flow.state.packing(self._first)
-        return dataclasses.replace(packing, step=flow.steps, time=flow.time)
+        return packing.with_(step=flow.steps, time=flow.time)
 
     def checkpoint(self) -> Checkpoint:
         """Return the state, its velocity and all counts."""

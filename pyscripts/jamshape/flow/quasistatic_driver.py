@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -111,9 +110,7 @@ class QuasistaticDriver:
     def frame(self) -> Packing:
         """Return the present state; its time is the strain."""
         run = self._run
-        return dataclasses.replace(
-            run.state.packing(self._first), step=run.steps + 1, time=run.strain
-        )
+        return run.state.packing(self._first).with_(step=run.steps + 1, time=run.strain)
 
     def checkpoint(self) -> Checkpoint:
         """Return the state and all counts."""

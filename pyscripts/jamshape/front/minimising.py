@@ -137,7 +137,7 @@ def _made_from(state: Packing) -> dict[str, object]:
 
 
 def _recipe(state: Packing, way: Given, strict: bool, stable_to_shear: bool) -> Recipe:
-    particles = Particles.given(state.shape, state.diameters, state.exponent, state.species)
+    particles = Particles.given(state.shape, state.diameters, state.form, state.species)
     low, high = RANGES["phi_start"].low, RANGES["phi_start"].high
     phi = min(max(state.phi, low), high)
     numbers = (state.n, state.dimension, 1, phi)

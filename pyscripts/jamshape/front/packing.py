@@ -60,8 +60,10 @@ class Packing(PackingLike):
         Periodic image counts; zeros by default.
     shape_style : str
         ``"spherocylinder"``, ``"superellipsoid"`` or ``"dimer"``.
+    form : (N, K) array of float64, optional
+        Numbers beside the diameters, for shapes that have some: the exponent of superellipsoids.
     exponent : (N,) array of float64, optional
-        p of ``|x/a|^2p + |y/b|^2p + |z/c|^2p = 1``, of shapes that have one; ones by default.
+        The form of superellipsoids, p of ``|x/a|^2p + |y/b|^2p + |z/c|^2p = 1``; ones by default.
     law : Interaction
         Constants of the contacts; by default k_e = 1 and two bonds side to side.
     step : int
@@ -191,7 +193,7 @@ class Packing(PackingLike):
             position=position,  # type: ignore[arg-type]
             orientation=unturned(n, cell.dimension) if orientation is None else orientation,  # type: ignore[arg-type]
             diameters=bodies.diameters,  # type: ignore[arg-type]
-            exponent=bodies.exponent,
+            form=bodies.form,
             species=np.ones(n, np.int64) if species is None else species,  # type: ignore[arg-type]
             id=np.arange(1, n + 1) if id is None else id,  # type: ignore[arg-type]
             box=cell,

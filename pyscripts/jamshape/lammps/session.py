@@ -252,7 +252,7 @@ class Session:
     def packing(self, time: float = 0.0) -> Packing:
         """Return the present state, sorted by ID, with a given time.
 
-        Shapes, exponents and species are those of the loaded packing; without one, shapes are
+        Shapes, forms and species are those of the loaded packing; without one, shapes are
         guessed from diameters, as for files.
         """
         with one_at_a_time():
@@ -289,7 +289,7 @@ class Session:
             known = {"shape_style": guess_shape_style(diameters), "species": types}
             return known | {"id": np.arange(1, len(types) + 1)}
         like = self._like.sorted_by_id()
-        names = ("shape_style", "exponent", "species", "id")
+        names = ("shape_style", "form", "species", "id")
         return {name: getattr(like, name) for name in names} | {"law": self._law or like.law}
 
     def neighbours(self) -> str:

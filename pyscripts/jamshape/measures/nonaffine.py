@@ -138,7 +138,7 @@ def _matched(first: Packing, second: Packing) -> Packing:
 
 
 _MOVING = (
-    "position", "orientation", "diameters", "exponent", "species", "id", "image",
+    "position", "orientation", "diameters", "form", "species", "id", "image",
 )  # fmt: skip
 
 

@@ -102,7 +102,7 @@ def measure(landscape: Landscape, minimum: Minimum) -> Measured:
         **order(packing),
     }
     if D == 3:
-        attributes |= packing.shape.described(packing.diameters, packing.exponent)
+        attributes |= packing.shape.described(packing.diameters, packing.form)
     rattler_ids = packing.id[found.rattlers].astype(np.float64)
     return Measured(attributes, {"rattler_ids": rattler_ids} | _net(landscape, minimum, found))
 

@@ -15,7 +15,7 @@ MOST = 256
 # Columns of LAMMPS that belong to particles, whatever their state.
 _LABELS = {"mol", "element", "typelabel", "mass", "q"}
 _OWN_LABELS = ("i_", "d_", "i2_", "d2_")  # of fix property/atom
-_STATE = {"position", "orientation", "diameters", "exponent", "box", "id"}
+_STATE = {"position", "orientation", "diameters", "form", "exponent", "box", "id"}
 
 
 def as_columns(columns: Mapping[Any, Any], n: int) -> dict[str, NDArray[Any]]:

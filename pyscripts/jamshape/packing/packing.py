@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import InitVar, dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
@@ -53,7 +53,7 @@ class Packing(Record):
     box: Box
     image: IntArray = field(default_factory=lambda: np.empty((0, 0), dtype=np.int64))
     shape_style: str = DEFAULT
-    exponent: FloatArray = field(default_factory=lambda: np.empty(0))
+    form: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     law: Interaction = field(default_factory=Interaction)
     step: int = 0
     time: float = 0.0
@@ -64,8 +64,9 @@ class Packing(Record):
     results: Mapping[str, Any] = field(default_factory=dict)
     file: Path | None = None
     columns: Mapping[str, Any] = field(default_factory=dict)
+    exponent: InitVar[FloatArray | None] = None
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, exponent: FloatArray | None) -> None:
         n = len(np.atleast_1d(real_numbers("position", self.position)))
         dimension = self.box.dimension
         if n == 0:
@@ -73,8 +74,7 @@ class Packing(Record):
             raise ValueError(msg)
         if real_numbers("image", self.image).size == 0:
             object.__setattr__(self, "image", np.zeros((n, dimension), dtype=np.int64))
-        if real_numbers("exponent", self.exponent).size == 0:
-            object.__setattr__(self, "exponent", np.ones(n))
+        object.__setattr__(self, "form", _form_of(self, exponent, n))
         vector = (n, dimension)
         rotation = (n,) if dimension == 2 else (n, 4)
         rests = {"position_rest": vector, "orientation_rest": rotation, "edges_rest": (dimension,)}
@@ -83,7 +83,7 @@ class Packing(Record):
             if real_numbers(name, getattr(self, name)).size == 0:
                 object.__setattr__(self, name, np.zeros(shape))
         floats = {"position": vector, "orientation": rotation, "diameters": (n, 3), **rests}
-        floats["exponent"] = (n,)
+        floats["form"] = (n, *np.shape(self.form)[1:])
         for name, shape in floats.items():
             object.__setattr__(self, name, as_floats(name, getattr(self, name), shape))
         for name, shape in (("species", (n,)), ("id", (n,)), ("image", vector)):
@@ -112,7 +112,7 @@ class Packing(Record):
 
     def compiled(self, law: Interaction | None = None) -> Any:
         """Make the compiled object that evaluates contacts of these particles; under their own law by default."""
-        sizes = (self.diameters, self.exponent)
+        sizes = (self.diameters, self.form)
         return self.shape.compiled(sizes, self.dimension, law or self.law, self.species)
 
     @cached_property
@@ -262,7 +262,7 @@ class Packing(Record):
     def sorted_by_id(self) -> Self:
         """Return the same packing with its particles in the order of their IDs."""
         order = np.argsort(self.id)
-        names = ["position", "orientation", "diameters", "exponent", "species", "id", "image"]
+        names = ["position", "orientation", "diameters", "form", "species", "id", "image"]
         names += ["position_rest", "orientation_rest"]
         columns = {name: column[order] for name, column in self.columns.items()}
         return self.with_(**{name: getattr(self, name)[order] for name in names}, columns=columns)
@@ -273,15 +273,38 @@ class Packing(Record):
         Other columns are kept, but with new poses, sizes or box only labels such as ``mol``.
         """
         changes.setdefault("columns", kept(self.columns, changes))
+        if changes.get("shape_style", self.shape_style) != self.shape_style:
+            changes.setdefault("form", np.empty((0, 0)))
         for name, rests in _REST_OF.items():
             for rest in rests if name in changes else ():
                 changes.setdefault(rest, np.empty(0))
-        return dataclasses.replace(self, **({"results": {}, "file": None} | changes))
+        unset = {"results": {}, "file": None, "exponent": None}
+        return dataclasses.replace(self, **(unset | changes))
 
     @property
     def to_store(self) -> dict[str, Any]:
         """Return the results without attributes of a run: a single frame cannot be continued as a run."""
         return {k: v for k, v in self.results.items() if k not in {"kind", "finished"}}
+
+
+# Declared after the class, whose constructor takes it by the same name.
+def _exponent(packing: Packing) -> FloatArray:
+    """(N,) exponents p of superellipsoids; ones for other shapes."""
+    return packing.form[:, 0] if packing.shape.has_exponent else np.ones(packing.n)
+
+
+Packing.exponent = property(_exponent)  # type: ignore[assignment]
+
+
+def _form_of(packing: Packing, exponent: FloatArray | None, n: int) -> FloatArray:
+    """Return the form (N, K), of exponents (N,) if they are given, or raise a ValueError."""
+    shape = shape_named(packing.shape_style)
+    if exponent is not None and real_numbers("exponent", exponent).size:
+        return shape.form_of_exponents(as_floats("exponent", exponent, (n,)))
+    given = real_numbers("form", packing.form)
+    if given.size == 0:
+        return shape.form_of_exponents(np.ones(n))
+    return as_floats("form", packing.form, (n, *given.shape[1:2]))
 
 
 def _check_labels(packing: Packing) -> None:
@@ -329,10 +352,8 @@ def _check_shapes(packing: Packing) -> None:
     if not (packing.diameters > 0).all():
         msg = f"diameters hold {packing.diameters.min()}, expected positive lengths"
         raise ValueError(msg)
-    if not (packing.exponent > 0.5).all():
-        msg = f"exponents hold {packing.exponent.min()}, expected p > 0.5, for which bodies are convex"
-        raise ValueError(msg)
     shape = packing.shape
+    shape.check_form(packing.form, packing.dimension)
     if not shape.fits(packing.diameters):
         wrong = next(d for d in packing.diameters if not shape.fits(d[None]))
         msg = f"diameters of a {shape.name} are {wrong.tolist()}, expected {shape.rule()}"

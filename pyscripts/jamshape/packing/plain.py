@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jamshape.arrays import FloatArray, real_numbers
-from jamshape.checks import require_in
+from jamshape.checks import Range, require_in
 from jamshape.packing.box import Box
 from jamshape.packing.given import as_floats
 from jamshape.shapes.shape import Parameter, Shape
@@ -21,7 +21,7 @@ class Bodies(NamedTuple):
     """Sizes of N particles, as in `Packing`."""
 
     diameters: ArrayLike
-    exponent: FloatArray
+    form: FloatArray
 
     @classmethod
     def of(
@@ -47,7 +47,7 @@ class Bodies(NamedTuple):
                 msg = f"{name} is not a parameter of {shape.name}s, expected {expected}"
                 raise ValueError(msg)
         given = {
-            known[name].name: _parameter(known[name], value, n)
+            known[name].name: known[name].read(value) if known[name].allowed is None else _parameter(known[name], value, n)
             for name, value in parameters.items()
         }
         if diameters is not None:
@@ -55,7 +55,7 @@ class Bodies(NamedTuple):
             if surplus:
                 msg = f"{surplus[0]} is given beside diameters, which determine it; leave one of them out"
                 raise ValueError(msg)
-            return cls(diameters, given.get(_EXPONENT, np.ones(n)))
+            return cls(diameters, shape.form_of_exponents(given.get(_EXPONENT, np.ones(n))))
         for parameter in shape.parameters:
             if parameter.name not in given:
                 msg = f"{parameter.option} of {shape.name}s is missing, expected {parameter.meaning}, or diameters"
@@ -104,7 +104,7 @@ def unturned(n: int, dimension: int) -> FloatArray:
 
 def _parameter(parameter: Parameter, value: ArrayLike, n: int) -> FloatArray:
     """Return a parameter of n particles, or raise a ValueError."""
-    found, allowed = _each(parameter.option, value, n), parameter.allowed
+    found, allowed = _each(parameter.option, value, n), parameter.allowed or Range(-np.inf, np.inf)
     fits = ((allowed.low <= found) & (found <= allowed.high)) | np.isin(found, allowed.also)
     for wrong in found[~fits][:1]:
         require_in(parameter.option, float(wrong), allowed)

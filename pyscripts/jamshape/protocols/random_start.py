@@ -70,7 +70,7 @@ def random_packing(
     unplaced, rng = _unplaced(n, phi, seed, (particles or Particles.of(), dimension))
     # Long particles are placed first, while there is room; short ones fit into gaps.
     first = np.argsort(-unplaced.outer_radius, kind="stable")
-    sizes = unplaced.diameters[first], unplaced.exponent[first]
+    sizes = unplaced.diameters[first], unplaced.form[first]
     bodies = unplaced.shape.compiled(sizes, dimension, unplaced.law)
     box = _box(float(np.sum(bodies.measure)), phi, dimension)
     found = bodies.insert(
@@ -82,7 +82,7 @@ def random_packing(
     if found["outcome"] != "all":
         raise _refusal(bodies, box, found)
     order = rng.permutation(n)  # independent of the order of insertion
-    names = ("diameters", "exponent", "species")
+    names = ("diameters", "form", "species")
     return unplaced.with_(
         box=box,
         position=found["position"][order],
@@ -133,7 +133,7 @@ def _unplaced(
         position=np.zeros((n, dimension)),
         orientation=unturned(n, dimension),
         diameters=sizes.diameters,
-        exponent=sizes.exponent,
+        form=sizes.form,
         species=sizes.species,
         id=1 + np.arange(n),
         box=Box(lo=np.zeros(dimension), edges=np.ones(dimension)),

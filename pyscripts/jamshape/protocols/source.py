@@ -37,7 +37,7 @@ class Source(NamedTuple):
     def read(cls, path: Path) -> Self:
         """Read any H5MD file of particles, a run or a packing; errors as `read_packing`."""
         stored, last = read_attributes(path), read_packing(path)
-        given = Particles.given(last.shape, last.diameters, last.exponent, last.species)
+        given = Particles.given(last.shape, last.diameters, last.form, last.species)
         names = [*(one.name for one in last.shape.parameters), "size_ratio", "kinds"]
         told = {name: stored[name] for name in names if name in stored}
         particles = dataclasses.replace(given, told=told) if told else given
@@ -80,9 +80,9 @@ class Source(NamedTuple):
         own, other = (
             p.sample(self.n, np.random.default_rng(self.seed)) for p in (self.particles, particles)
         )
-        pairs = zip(own[:2], other[:2], strict=True)
-        return all(np.array_equal(_sorted(one), _sorted(two)) for one, two in pairs)
+        rows, others = (np.column_stack([x.diameters, x.form]) for x in (own, other))
+        return np.array_equal(_sorted(rows), _sorted(others))
 
 
 def _sorted(rows: FloatArray) -> FloatArray:
-    return np.asarray(rows[np.lexsort(np.atleast_2d(rows.T))])
+    return np.asarray(rows[np.lexsort(rows.T)])

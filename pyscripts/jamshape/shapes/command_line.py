@@ -15,8 +15,9 @@ def add_particle_options(parser: ArgumentParser) -> None:
     group = parser.add_argument_group("particles")
     group.add_argument("--shape", choices=SHAPES, help=f"({DEFAULT})")
     for option, known in _parameters().items():
-        usual = ", ".join(f"{shape.name} {parameter.default:g}" for shape, parameter in known)
-        group.add_argument(f"--{option}", type=float, help=f"{known[0][1].meaning} ({usual})")
+        usual = ", ".join(f"{shape.name} {parameter.usual}" for shape, parameter in known)
+        kind = str if isinstance(known[0][1].default, str) else float
+        group.add_argument(f"--{option}", type=kind, help=f"{known[0][1].meaning} ({usual})")
     usual = ", ".join(f"{shape.name} {shape.size_ratio:g}" for shape in SHAPES.values())
     group.add_argument("--size-ratio", type=float, help=f"big over small, mixed 1:1 ({usual})")
     group.add_argument(

@@ -15,6 +15,7 @@ from jamshape.arrays import real_numbers
 from jamshape.shapes.particles import Kind, Particles
 from jamshape.shapes.shape import Shape
 
+_TABLE = 2  # dimensions
 _OF_KINDS = ("size", "share", "spread")
 
 _TEXT = """{about}
@@ -86,7 +87,7 @@ def signature_of(shape: Shape) -> Signature:
 
 def _text_of(shape: Shape) -> str:
     parameters = "\n".join(
-        f"{p.option} : float or (k,) array\n    {p.meaning}; {p.default:g} by default."
+        f"{p.option} : {'array_like or str' if isinstance(p.default, str) else 'float or (k,) array'}\n    {p.meaning}; {p.usual} by default."
         for p in shape.parameters
     )
     first = dict(shape.examples[0])
@@ -96,9 +97,26 @@ def _text_of(shape: Shape) -> str:
         size_ratio=shape.size_ratio,
         unit=shape.unit,
         name=shape.compiled_name,
-        example=", ".join(f"{p.option}={first[p.name]:g}" for p in shape.parameters),
+        example=", ".join(f"{p.option}={_shown(first[p.name])}" for p in shape.parameters),
         made=Particles.of(shape, 1.25, **first),
     )
+
+
+def _texts(value: Any) -> Any:
+    """Return a parameter that is read from a text or a table as one object, or those of several kinds."""
+    is_several = isinstance(value, list | tuple | np.ndarray) and all(
+        isinstance(one, str) or np.ndim(one) == _TABLE for one in value
+    )
+    found = np.empty(len(value) if is_several else (), object)
+    for k in range(len(value)) if is_several else ():
+        found[k] = value[k]
+    if not is_several:
+        found[()] = value
+    return found
+
+
+def _shown(value: float | str) -> str:
+    return repr(value) if isinstance(value, str) else f"{value:g}"
 
 
 def _particles(
@@ -113,20 +131,30 @@ def _particles(
             expected = ", ".join((*parameters, "size_ratio", *_OF_KINDS))
             msg = f"{name} is unknown for {shape.name}s, expected {expected}"
             raise ValueError(msg)
-    values: dict[str, Any] = {k: real_numbers(k, v) for k, v in {**parameters, **kinds}.items()}
+    texts = {p.option for p in shape.parameters if isinstance(p.default, str)}
+    values: dict[str, Any] = {
+        k: _texts(v) if k in texts else real_numbers(k, v)
+        for k, v in {**parameters, **kinds}.items()
+    }
     if not kinds and all(np.ndim(value) == 0 for value in values.values()):
-        return Particles.of(shape, size_ratio, **{k: float(v) for k, v in values.items()})
+        return Particles.of(shape, size_ratio, **{k: v.item() for k, v in values.items()})
     if size_ratio is not None:
         msg = "size_ratio does not work with kinds, expected the size of each kind in size alone"
         raise ValueError(msg)
     try:
         columns = np.broadcast_arrays(
-            *(np.atleast_1d(v).astype(np.float64) for v in values.values())
+            *(
+                np.atleast_1d(v).astype(object if k in texts else np.float64)
+                for k, v in values.items()
+            )
         )
     except ValueError:
         lengths = {name: np.size(value) for name, value in values.items()}
         msg = f"arrays have lengths {lengths}, expected one entry for each kind"
         raise ValueError(msg) from None
-    rows = [dict(zip(values, row, strict=True)) for row in np.column_stack(columns).tolist()]
+    rows = [
+        dict(zip(values, row, strict=True))
+        for row in zip(*(column.tolist() for column in columns), strict=True)
+    ]
     own = [{name: row.pop(name) for name in kinds} for row in rows]
     return Particles.mixture(shape, [Kind(row, **k) for row, k in zip(rows, own, strict=True)])

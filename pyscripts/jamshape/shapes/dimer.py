@@ -30,28 +30,28 @@ class Dimer(ElongatedShape):
     )  # fmt: skip
     examples = ({"alpha": 1.0}, {"alpha": 0.4}, {"alpha": 1.3})
 
-    def outline(self, diameters: FloatArray, exponent: float, points: int = 64) -> FloatArray:
+    def outline(self, diameters: FloatArray, form: FloatArray, points: int = 64) -> FloatArray:
         """See `Shape.outline`."""
-        del exponent
+        del form
         radius, A = diameters[1] / 2, self.spine(diameters)
         waist = self._waist(radius, A)
         right = radius * arc(waist - np.pi, np.pi - waist, points // 2) + [A, 0.0]
         return np.concatenate([right, -right])
 
-    def surface(self, diameters: FloatArray, exponent: float, level: int = 3) -> SurfaceMesh:
+    def surface(self, diameters: FloatArray, form: FloatArray, level: int = 3) -> SurfaceMesh:
         """See `Shape.surface`."""
-        del exponent
+        del form
         radius, A = diameters[1] / 2, self.spine(diameters)
         part = arc(np.pi, self._waist(radius, A), 2 + 2 * 2**level)  # of the left sphere
         normal = np.concatenate([part, part[::-1] * [-1, 1]])
         centre = np.repeat([[-A, 0.0], [A, 0.0]], len(part), axis=0)
         return revolved(radius * normal + centre, normal, 8 * 2**level)
 
-    def solid(self, diameters: FloatArray, exponent: float) -> Balls:
+    def solid(self, diameters: FloatArray, form: FloatArray) -> Balls:
         """See `Shape.solid`."""
-        del exponent
+        del form
         A = self.spine(diameters)
-        return Balls(np.array([[-A, 0.0, 0.0], [A, 0.0, 0.0]]), float(diameters[1]) / 2)
+        return Balls(np.array([[-A, 0.0, 0.0], [A, 0.0, 0.0]]), np.full(2, diameters[1] / 2))
 
     @staticmethod
     def _waist(radius: float, A: float) -> float:

@@ -21,3 +21,8 @@ def Dimers(
     size_ratio: float | None = None,
     **kinds: ArrayLike,
 ) -> Particles: ...
+def Clumps(
+    discs: ArrayLike = 0.5773502691896258 0.0 0.0 0.5/-0.2886751345948129 0.5 0.0 0.5/-0.2886751345948129 -0.5 0.0 0.5,
+    size_ratio: float | None = None,
+    **kinds: ArrayLike,
+) -> Particles: ...

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -21,8 +22,8 @@ class Sizes(NamedTuple):
 
     diameters: FloatArray
     """(n, 3), [length], as in LAMMPS."""
-    exponent: FloatArray
-    """(n,); ones for shapes without exponent."""
+    form: FloatArray
+    """(n, K) further numbers, as in `Packing.form`."""
     species: IntArray
     """(n,) kinds, LAMMPS types, from 1."""
 
@@ -34,7 +35,7 @@ class Kind:
 
     Parameters
     ----------
-    parameters : mapping of str to float
+    parameters : mapping of str to float or str
         Parameters of the shape, such as alpha; the shape's defaults where missing.
     size : float
         Relative to the unit of length (2R, or the shortest semi-axis a).
@@ -55,7 +56,7 @@ class Kind:
     >>> mixture = Particles.mixture("spherocylinder", [discs, rods])
     """
 
-    parameters: Mapping[str, float] = field(default_factory=dict)
+    parameters: Mapping[str, Any] = field(default_factory=dict)
     size: float = 1.0
     share: float = 1.0
     spread: float = 0.0
@@ -97,7 +98,7 @@ class Particles:
     @classmethod
     @checked
     def of(
-        cls, shape: str | Shape = DEFAULT, size_ratio: float | None = None, **parameters: float
+        cls, shape: str | Shape = DEFAULT, size_ratio: float | None = None, **parameters: Any
     ) -> Particles:
         """Equal particles, or a 1:1 mixture of small and big ones with the same parameters.
 
@@ -107,7 +108,7 @@ class Particles:
         size_ratio : float, optional
             Size ratio, at least 1; the default depends on the shape (1.4 for rods,
             Marschall & Teitel 2018, Sec. II; 1, equal particles, for superellipsoids).
-        **parameters : float
+        **parameters : float or str
             Parameters of the shape; its defaults where missing.
 
         Raises
@@ -150,17 +151,14 @@ class Particles:
         cls,
         shape: str | Shape,
         diameters: ArrayLike,
-        exponent: ArrayLike | None = None,
+        form: ArrayLike | None = None,
         species: ArrayLike | None = None,
     ) -> Particles:
-        """Specify individual particles: (n, 3) diameters, (n,) exponents and species from 1."""
+        """Specify individual particles: (n, 3) diameters, (n, K) forms or (n,) exponents, and species from 1."""
         its = shape_named(shape) if isinstance(shape, str) else shape
         d = np.atleast_2d(real_numbers("diameters", diameters).astype(np.float64))
-        p = (
-            np.ones(len(d))
-            if exponent is None
-            else real_numbers("exponent", exponent).astype(np.float64)
-        )
+        p = real_numbers("form", np.ones(len(d)) if form is None else form).astype(np.float64)
+        p = its.form_of_exponents(p) if p.ndim == 1 else p
         kinds = np.ones(len(d)) if species is None else whole_numbers("species", species)
         sizes = Sizes(d, p, kinds.astype(np.int64))
         return cls(its, _Given(sizes), {"kinds": "given one by one"})
@@ -185,7 +183,11 @@ class Particles:
         """
         require_stated(n=n)
         sizes = self.draw(n, rng)
-        expected = {"diameters": (n, 3), "exponent": (n,), "species": (n,)}
+        if np.ndim(sizes.form) == 1:
+            own = self.shape.form_of_exponents(np.asarray(sizes.form, np.float64))
+            sizes = sizes._replace(form=own)
+        columns = np.shape(sizes.form)[1:2]
+        expected = {"diameters": (n, 3), "form": (n, *columns), "species": (n,)}
         for name, shape in expected.items():
             found = np.shape(getattr(sizes, name))
             if found != shape:
@@ -196,7 +198,7 @@ class Particles:
         if not valid:
             msg = f"a particle of the mixture is not a {self.shape.name}, expected {self.shape.rule()}"
             raise ValueError(msg)
-        return Sizes(d, np.asarray(sizes.exponent, np.float64), np.asarray(sizes.species, np.int64))
+        return Sizes(d, np.asarray(sizes.form, np.float64), np.asarray(sizes.species, np.int64))
 
 
 def parse_kind(text: str) -> Kind:
@@ -208,22 +210,33 @@ def parse_kind(text: str) -> Kind:
         If the text has another format.
     """
     try:
-        numbers = {k.strip(): float(v) for k, v in (part.split("=") for part in text.split(","))}
+        parts = (part.split("=") for part in text.split(","))
+        numbers = {name.strip(): _number(value) for name, value in parts}
     except ValueError:
         msg = f"a kind is {text!r}, expected numbers by name such as alpha=4,size=1.4,share=0.5"
         raise ValueError(msg) from None
-    own = {name: numbers.pop(name) for name in ("size", "share", "spread") if name in numbers}
+    own = {name: float(numbers.pop(name)) for name in ("size", "share", "spread") if name in numbers}
     return Kind(numbers, **own)
+
+
+def _number(text: str) -> Any:
+    """Return a number, or the text of a parameter that is none; raise ValueError for empty ones."""
+    with suppress(ValueError):
+        return float(text)
+    if not any(sign.isspace() or sign in "/." for sign in text.strip()):
+        raise ValueError
+    return text.strip()
 
 
 def _text(kind: Kind) -> str:
     own = {"size": kind.size, "share": kind.share, "spread": kind.spread}
     return ",".join(
-        f"{name}={float(value)!r}" for name, value in (dict(kind.parameters) | own).items()
+        f"{name}={value if isinstance(value, str) else repr(float(value))}"
+        for name, value in (dict(kind.parameters) | own).items()
     )
 
 
-def _with_defaults(shape: Shape, parameters: Mapping[str, float]) -> dict[str, float]:
+def _with_defaults(shape: Shape, parameters: Mapping[str, Any]) -> dict[str, Any]:
     known = {p.name: p.default for p in shape.parameters}
     by_option = {p.option: p.name for p in shape.parameters}
     given = {by_option.get(name, name): value for name, value in parameters.items()}
@@ -232,9 +245,7 @@ def _with_defaults(shape: Shape, parameters: Mapping[str, float]) -> dict[str, f
             msg = f"{name} is not a parameter of {shape.name}s, expected {', '.join(known)}"
             raise ValueError(msg)
     chosen = known | given
-    for parameter in shape.parameters:
-        require_in(parameter.option, chosen[parameter.name], parameter.allowed)
-    return {name: float(value) for name, value in chosen.items()}
+    return {p.name: p.read(chosen[p.name]) for p in shape.parameters}
 
 
 @dataclass(frozen=True)
@@ -247,14 +258,16 @@ class _Mixture:
     def __call__(self, n: int, rng: np.random.Generator) -> Sizes:
         kinds = self.kinds
         species = np.repeat(np.arange(1, len(kinds) + 1), _numbers(n, [k.share for k in kinds]))
-        diameters, exponent = np.empty((n, 3)), np.empty(n)
+        diameters, form = np.empty((n, 3)), np.empty((n, 0))
         for number, kind in enumerate(kinds, 1):
             own = species == number
             size = np.full(int(own.sum()), kind.size)
             if kind.spread:
                 size *= np.exp(kind.spread * rng.standard_normal(len(size)))
-            diameters[own], exponent[own] = self.shape.sizes(kind.parameters, size)
-        return Sizes(diameters, exponent, species)
+            diameters[own], its = self.shape.sizes(kind.parameters, size)
+            form = self.shape.widened(form, its.shape[1])
+            form[own] = self.shape.widened(its, form.shape[1])
+        return Sizes(diameters, form, species)
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jamshape.arrays import real_numbers
-from jamshape.checks import Range, said
+from jamshape.checks import Range, require_in, said
 
 if TYPE_CHECKING:
     from jamshape.arrays import FloatArray, IntArray
@@ -36,21 +36,36 @@ def in_name(number: float) -> str:
 
 
 class Parameter(NamedTuple):
-    """A number that describes a particle beside its size, such as an aspect ratio."""
+    """A number that describes a particle beside its size, such as an aspect ratio; or a text, of subclasses."""
 
     name: str
-    default: float
+    default: float | str
     meaning: str
     option: str
     """Name on command lines and in file names."""
-    allowed: Range
-    """Allowed range, in which it was tested."""
+    allowed: Range | None
+    """Allowed range, in which it was tested; None for texts."""
+
+    def read(self, value: Any) -> float | str:
+        """Return a value that is allowed, or raise a ValueError."""
+        if self.allowed is not None:
+            require_in(self.option, value, self.allowed)
+        return float(value)
+
+    @property
+    def usual(self) -> str:
+        """The default, for help."""
+        return self.default if isinstance(self.default, str) else f"{self.default:g}"
 
     @property
     def symbol(self) -> str:
         """TeX symbol, without dollars."""
         texts = {"alpha": r"\alpha", "exponent": "p", "w1": "w_1", "w2": "w_2"}
         return texts.get(self.name, self.name)
+
+
+MOST_NUMBERS = 1024
+"""Most numbers in the form of a particle."""
 
 
 class Style(NamedTuple):
@@ -123,6 +138,17 @@ def pair_coefficients(k_e: Stiffness, species: IntArray) -> list[str]:
     return [f"pair_coeff {i + 1} {j + 1} {table[i][j]!r}" for i in types for j in types[i:]]
 
 
+def _types_of_forms(species: IntArray, form: FloatArray) -> tuple[IntArray, IntArray | None]:
+    """Return the species of each LAMMPS type, and the (N,) types where a species of several forms needs one for each."""
+    kinds = np.arange(1, species.max() + 1)
+    if form.shape[1] == 0:
+        return kinds, None
+    rows, of = np.unique(np.column_stack([form, species]), axis=0, return_inverse=True)
+    if len(rows) == len(np.unique(species)):
+        return kinds, None
+    return rows[:, -1].astype(np.int64), 1 + of.reshape(-1).astype(np.int64)
+
+
 class Interaction(NamedTuple):
     """Constants of the contacts: beside the particles, all that energy and forces of a packing depend on.
 
@@ -184,7 +210,12 @@ class Shape(ABC):
     """Default dimension of packings."""
     size_ratio: ClassVar[float] = 1.0
     """Default size ratio; 1 for equal particles."""
+    has_form: ClassVar[bool] = False
+    """Whether a particle is given by more than diameters and an exponent."""
     has_exponent: ClassVar[bool] = False
+    """Whether the form of a particle is an exponent."""
+    stored: ClassVar[tuple[str, ...]] = ("form",)
+    """Fields of a packing that files hold of each particle beside its diameters."""
 
     def __eq__(self, other: object) -> bool:
         """Return whether it is the same shape; true for copies and pickles."""
@@ -209,8 +240,8 @@ class Shape(ABC):
 
         Parameters
         ----------
-        particles : (N, 3) and (N,) arrays of float64
-            Diameters, [length], and exponents.
+        particles : (N, 3) and (N, K) arrays of float64
+            Diameters, [length], and further numbers of each (`Packing.form`).
         dimension : {2, 3}
         law : Interaction
         species : (N,) array of int64, optional
@@ -228,6 +259,31 @@ class Shape(ABC):
             table = np.array(law.k_e, np.float64)
             return make(*particles, dimension, table, species, law.sides)
         return make(*particles, dimension, law.k_e, law.sides)
+
+    def form_of_exponents(self, exponent: FloatArray) -> FloatArray:
+        """Return the (N, K) form of (N,) exponents, all 1 for shapes without; the usual form, if there is one.
+
+        Raises
+        ------
+        ValueError
+            If another shape is given exponents.
+        """
+        if (exponent != 1).any():
+            msg = f"a {self.name} has no exponent, expected none; leave it out"
+            raise ValueError(msg)
+        return np.empty((len(exponent), 0))
+
+    def check_form(self, form: FloatArray, dimension: int) -> None:
+        """Raise a ValueError unless the (N, K) form, beside diameters, is one of this shape."""
+        del dimension
+        if form.shape[1]:
+            msg = f"form has {form.shape[1]} columns, expected none for a {self.name}; leave it out"
+            raise ValueError(msg)
+
+    @staticmethod
+    def widened(form: FloatArray, columns: int) -> FloatArray:
+        """Return (n, K) forms with zeros appended, which do not count, for forms of different lengths in one array."""
+        return np.pad(form, ((0, 0), (0, max(0, columns - form.shape[1]))))
 
     @abstractmethod
     def fits(self, diameters: FloatArray) -> bool:
@@ -258,7 +314,7 @@ class Shape(ABC):
     def sizes(
         self, parameters: Mapping[str, float | FloatArray], size: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Convert parameters, numbers or (n,), and (n,) sizes to (n, 3) diameters and (n,) exponents.
+        """Convert parameters, numbers or (n,), and (n,) sizes to (n, 3) diameters and (n, K) forms.
 
         Raises
         ------
@@ -268,34 +324,44 @@ class Shape(ABC):
 
     @abstractmethod
     def parameters_of(
-        self, diameters: FloatArray, exponent: float
+        self, diameters: FloatArray, form: FloatArray
     ) -> tuple[dict[str, float], float]:
-        """Return parameters and size of a particle from (3,) diameters: the inverse of `sizes`."""
+        """Return parameters and size of a particle from (3,) diameters and its (K,) form: the inverse of `sizes`."""
 
     def style(self, packing: Any, law: Interaction) -> Style:
-        """Return the LAMMPS commands for a packing of this shape."""
-        return Style(packing.species, self.styled(packing, law, f"{self.name}/harmonic"))
+        """Return the LAMMPS commands for a packing of this shape; forms are per type there."""
+        types, form = packing.species, packing.form
+        kinds, rows = _types_of_forms(types, form)
+        if rows is not None:
+            types = rows
+        lines = [f"pair_style {self.style_name(law)}", *pair_coefficients(law.k_e, kinds)]
+        for k in np.unique(types) if form.shape[1] else ():
+            row = kinds[k - 1] - 1
+            own = law.k_e[row][row] if isinstance(law.k_e, tuple) else law.k_e
+            numbers = " ".join(map(repr, form[types == k][0].tolist()))
+            lines.append(f"pair_coeff {k} {k} {own!r} {numbers}")
+        return Style(types, "\n".join(lines))
 
-    def styled(self, packing: Any, law: Interaction, style: str) -> str:
-        """Return `pair_style` and `pair_coeff` of a packing whose LAMMPS types are its species."""
-        kinds = np.arange(1, packing.species.max() + 1)
-        return "\n".join([f"pair_style {style}", *pair_coefficients(law.k_e, kinds)])
+    def style_name(self, law: Interaction) -> str:
+        """Return the name of the pair style, with its settings."""
+        del law
+        return f"{self.name}/harmonic"
 
-    def described(self, diameters: FloatArray, exponent: FloatArray) -> dict[str, float]:
-        """Return descriptors of the first of (N, 3) diameters and (N,) exponents."""
-        del diameters, exponent
+    def described(self, diameters: FloatArray, form: FloatArray) -> dict[str, float]:
+        """Return descriptors of the first of (N, 3) diameters and (N, K) forms."""
+        del diameters, form
         return {}
 
     @abstractmethod
-    def outline(self, diameters: FloatArray, exponent: float, points: int = 64) -> FloatArray:
+    def outline(self, diameters: FloatArray, form: FloatArray, points: int = 64) -> FloatArray:
         """(K, 2) vertices of a polygon around a particle in the plane, in body coordinates."""
 
     @abstractmethod
-    def surface(self, diameters: FloatArray, exponent: float, level: int = 3) -> SurfaceMesh:
+    def surface(self, diameters: FloatArray, form: FloatArray, level: int = 3) -> SurfaceMesh:
         """Cover a particle in space with triangles, in body coordinates."""
 
     @abstractmethod
-    def solid(self, diameters: FloatArray, exponent: float) -> Solid:
+    def solid(self, diameters: FloatArray, form: FloatArray) -> Solid:
         """Describe a particle for programs that do not know the shape."""
 
     def spine(self, diameters: FloatArray) -> float:
@@ -329,6 +395,7 @@ class ElongatedShape(Shape):
     )  # fmt: skip
     unit = "2R"
     size_ratio = 1.4
+    stored = ("half_length", "radius")
 
     def fits(self, diameters: FloatArray) -> bool:
         """See `Shape.fits`."""
@@ -361,13 +428,13 @@ class ElongatedShape(Shape):
         radius = 0.5 * size
         half_length = parameters["alpha"] * radius
         long = 2 * (half_length + radius)
-        return np.column_stack([long, 2 * radius, 2 * radius]), np.ones(len(size))
+        return np.column_stack([long, 2 * radius, 2 * radius]), np.empty((len(size), 0))
 
     def parameters_of(
-        self, diameters: FloatArray, exponent: float
+        self, diameters: FloatArray, form: FloatArray
     ) -> tuple[dict[str, float], float]:
         """See `Shape.parameters_of`."""
-        del exponent
+        del form
         width = float(diameters[1])
         return {"alpha": float(diameters[0] - width) / width}, width
 

@@ -34,11 +34,12 @@ class Superquadric:
 
 @dataclass(frozen=True, eq=False)
 class Balls:
-    """Several balls of one radius."""
+    """Several balls."""
 
     centers: FloatArray
     """(K, 3)"""
-    radius: float
+    radii: FloatArray
+    """(K,)"""
 
 
 Solid = RoundedSegment | Superquadric | Balls

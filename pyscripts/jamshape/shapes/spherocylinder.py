@@ -25,33 +25,31 @@ class Spherocylinder(ElongatedShape):
     name = "spherocylinder"
     examples = ({"alpha": 4.0}, {"alpha": 0.01}, {"alpha": 0.0})
 
-    def style(self, packing: Any, law: Interaction) -> Style:
-        """See `Shape.style`; `sides` is the number of bonds of a side-to-side contact."""
-        sides = ("one", "two")[law.sides - 1]
-        style = f"{self.name}/harmonic sides {sides}"
-        return Style(packing.species, self.styled(packing, law, style))
+    def style_name(self, law: Interaction) -> str:
+        """See `Shape.style_name`; each law of two rods side by side is a setting."""
+        return f"{self.name}/harmonic sides {('one', 'two')[law.sides - 1]}"
 
     def stem(self, parameters: Mapping[str, float]) -> str:
         """See `Shape.stem`."""
         return "alpha" + in_name(parameters["alpha"])
 
-    def outline(self, diameters: FloatArray, exponent: float, points: int = 64) -> FloatArray:
+    def outline(self, diameters: FloatArray, form: FloatArray, points: int = 64) -> FloatArray:
         """See `Shape.outline`."""
-        del exponent
+        del form
         radius, A = diameters[1] / 2, self.spine(diameters)
         right = radius * arc(-np.pi / 2, np.pi / 2, points // 2) + [A, 0.0]
         return np.concatenate([right, -right])
 
-    def surface(self, diameters: FloatArray, exponent: float, level: int = 3) -> SurfaceMesh:
+    def surface(self, diameters: FloatArray, form: FloatArray, level: int = 3) -> SurfaceMesh:
         """See `Shape.surface`."""
-        del exponent
+        del form
         radius, A = diameters[1] / 2, self.spine(diameters)
         cap = arc(0, np.pi / 2, 2 + 2**level)
         normal = np.concatenate([cap * [-1, 1], cap[::-1]])
         ends = np.repeat([[-A, 0.0], [A, 0.0]], len(cap), axis=0)
         return revolved(radius * normal + ends, normal, 8 * 2**level)
 
-    def solid(self, diameters: FloatArray, exponent: float) -> RoundedSegment:
+    def solid(self, diameters: FloatArray, form: FloatArray) -> RoundedSegment:
         """See `Shape.solid`."""
-        del exponent
+        del form
         return RoundedSegment(self.spine(diameters), float(diameters[1]) / 2)

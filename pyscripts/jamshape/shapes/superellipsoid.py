@@ -51,6 +51,21 @@ class Superellipsoid(Shape):
         {"exponent": 1.0, "w1": 1.0, "w2": 1.0},
     )
     has_exponent = True
+    stored = ("exponent",)
+
+    def form_of_exponents(self, exponent: FloatArray) -> FloatArray:
+        """See `Shape.form_of_exponents`."""
+        return exponent[:, None]
+
+    def check_form(self, form: FloatArray, dimension: int) -> None:
+        """See `Shape.check_form`."""
+        del dimension
+        if form.shape[1] != 1:
+            msg = f"form has {form.shape[1]} columns, expected one for a {self.name}, the exponent p"
+            raise ValueError(msg)
+        if not (form > 0.5).all():
+            msg = f"exponents hold {form.min()}, expected p > 0.5, for which bodies are convex"
+            raise ValueError(msg)
 
     def fits(self, diameters: FloatArray) -> bool:
         """See `Shape.fits`."""
@@ -65,38 +80,21 @@ class Superellipsoid(Shape):
     ) -> tuple[FloatArray, FloatArray]:
         """See `Shape.sizes`."""
         axes = axes_from(parameters["w1"], parameters["w2"])
-        return size[:, None] * (2 * axes), np.full(len(size), parameters["exponent"])
+        exponent = np.full(len(size), parameters["exponent"])
+        return size[:, None] * (2 * axes), exponent[:, None]
 
     def parameters_of(
-        self, diameters: FloatArray, exponent: float
+        self, diameters: FloatArray, form: FloatArray
     ) -> tuple[dict[str, float], float]:
         """See `Shape.parameters_of`; in units of the shortest semi-axis a."""
         a, b, c = (float(axis) for axis in np.sort(diameters) / 2)
-        return {"exponent": float(exponent), "w1": a / b, "w2": c / b}, a
+        return {"exponent": float(form[0]), "w1": a / b, "w2": c / b}, a
 
-    def style(self, packing: Any, law: Interaction) -> Style:
-        """See `Shape.style`; exponents are per type in LAMMPS."""
-        types = packing.species
-        kinds = np.arange(1, types.max() + 1)
-        exponents = {int(k): packing.exponent[types == k] for k in np.unique(types)}
-        if any((own != own[0]).any() for own in exponents.values()):
-            # A species may hold several exponents: each exponent of a species gets a type.
-            both = np.column_stack([packing.exponent, packing.species])
-            rows, numbers = np.unique(both, axis=0, return_inverse=True)
-            types, kinds = 1 + numbers.reshape(-1).astype(np.int64), rows[:, 1].astype(np.int64)
-            exponents = {int(k): packing.exponent[types == k] for k in np.unique(types)}
-        lines = [f"pair_style {self.name}/harmonic", *pair_coefficients(law.k_e, kinds)]
-        for k, p in exponents.items():
-            row = kinds[k - 1] - 1
-            own = law.k_e[row][row] if isinstance(law.k_e, tuple) else law.k_e
-            lines.append(f"pair_coeff {k} {k} {own!r} {float(p[0])!r}")
-        return Style(types, "\n".join(lines))
-
-    def described(self, diameters: FloatArray, exponent: FloatArray) -> dict[str, float]:
+    def described(self, diameters: FloatArray, form: FloatArray) -> dict[str, float]:
         """Asphericity and beta (Yuan et al. 2019, Eq. 2 and Sec. 2.1)."""
         axes = diameters[0] / 2
         return {
-            "asphericity": float(asphericity(axes, exponent[0])),
+            "asphericity": float(asphericity(axes, form[0, 0])),
             "beta": float(reduced_aspect_ratio(axes)),
         }
 
@@ -105,16 +103,16 @@ class Superellipsoid(Shape):
         exponent, w1, w2 = (in_name(parameters[p.name]) for p in self.parameters)
         return f"p{exponent}_w{w1}_{w2}"
 
-    def outline(self, diameters: FloatArray, exponent: float, points: int = 64) -> FloatArray:
+    def outline(self, diameters: FloatArray, form: FloatArray, points: int = 64) -> FloatArray:
         """See `Shape.outline`."""
         turn = arc(0, 2 * np.pi, points + 1)[:-1]
-        scaled: FloatArray = np.sign(turn) * np.abs(turn) ** (1 / exponent) * diameters[:2] / 2
+        scaled: FloatArray = np.sign(turn) * np.abs(turn) ** (1 / form[0]) * diameters[:2] / 2
         return scaled
 
-    def surface(self, diameters: FloatArray, exponent: float, level: int = 3) -> SurfaceMesh:
+    def surface(self, diameters: FloatArray, form: FloatArray, level: int = 3) -> SurfaceMesh:
         """See `Shape.surface`."""
-        return surface_mesh(diameters / 2, exponent, level)
+        return surface_mesh(diameters / 2, form[0], level)
 
-    def solid(self, diameters: FloatArray, exponent: float) -> Superquadric:
+    def solid(self, diameters: FloatArray, form: FloatArray) -> Superquadric:
         """See `Shape.solid`."""
-        return Superquadric(diameters / 2, 1 / exponent)
+        return Superquadric(diameters / 2, 1 / form[0])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from jamshape.shapes.clump import Clump
 from jamshape.shapes.dimer import Dimer
 from jamshape.shapes.shape import Shape
 from jamshape.shapes.spherocylinder import Spherocylinder
@@ -19,6 +20,7 @@ SHAPES: dict[str, Shape] = {
         Spherocylinder(),
         Superellipsoid(),
         Dimer(),
+        Clump(),
     )
 }
 """Shapes by name; the first is the default."""
@@ -81,7 +83,11 @@ def guess_shape_style(diameters: FloatArray, *, has_exponent: bool = False) -> s
         If no shape fits.
     """
     for name, shape in SHAPES.items():
-        if shape.fits(diameters) and shape.has_exponent >= has_exponent:
+        if (
+            shape.fits(diameters)
+            and shape.has_exponent >= has_exponent
+            and not shape.has_form
+        ):
             return name
     msg = f"diameters such as {diameters[0].tolist()} fit no shape, expected positive lengths"
     raise ValueError(msg)

@@ -11,12 +11,12 @@ BOX = Box(np.array([-1.0, 2.0]), np.array([4.0, 7.0]))
 
 def one(shape, **parameters):
     known = {p.name: p.default for p in SHAPES[shape].parameters} | parameters
-    diameters, exponent = SHAPES[shape].sizes(known, np.ones(1))
+    diameters, form = SHAPES[shape].sizes(known, np.ones(1))
     return Packing(
         position=np.array([[-20.0, 31.0]]),
         orientation=np.array([0.3]),
         diameters=diameters,
-        exponent=exponent,
+        form=form,
         species=np.ones(1, int),
         id=np.ones(1, int),
         box=BOX,

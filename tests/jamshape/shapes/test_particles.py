@@ -55,7 +55,7 @@ def test_options_name_particles_as_python_does():
     assert boxes.told == {"exponent": 2.0, "w1": 0.5, "w2": 1.0}
     kinds = ("--shape", "superellipsoid", "--kind", "p=2,share=3", "--kind", "w1=0.5,size=2")
     sizes = drawn(from_options(*kinds), 8)
-    assert sizes.exponent.tolist() == [2.0] * 6 + [1.0] * 2
+    assert sizes.form[:, 0].tolist() == [2.0] * 6 + [1.0] * 2
     assert parse_kind("alpha=4, size=1.4") == Kind({"alpha": 4.0}, 1.4)
 
 

@@ -161,7 +161,7 @@ def test_axes_have_the_papers_ratios_in_units_of_a():
 def director_axis(axes):
     """Axis of the director in the compiled shape."""
     d = 2 * np.atleast_2d(axes)
-    ellipsoids = shape_named("superellipsoid").compiled((d, np.ones(len(d))), 3, Interaction())
+    ellipsoids = shape_named("superellipsoid").compiled((d, np.ones((len(d), 1))), 3, Interaction())
     return ellipsoids.director.reshape(np.shape(axes)[:-1])
 
 

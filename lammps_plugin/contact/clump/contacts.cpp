@@ -1,0 +1,7 @@
+#include "contact/clump/clump.hpp"
+
+namespace jamshape {
+
+JAMSHAPE_CONTACTS(, ClumpModel)
+
+}  // namespace jamshape

@@ -1,0 +1,341 @@
+"""Clumps: rigid unions of discs (balls in 3D) of any radii at any places.
+
+Contacts, area and moments: `lammps_plugin/contact/clump/`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from jamshape.arrays import FloatArray
+from jamshape.shapes.level_set import level_set_mesh
+from jamshape.shapes.mesh import SurfaceMesh, arc
+from jamshape.shapes.shape import MOST_NUMBERS, Parameter, Shape
+from jamshape.shapes.solid import Balls
+
+_WIDTH = 4  # numbers of a disc: x y z r
+_PRINCIPAL = 1e-9  # relative; off the centre or the principal axes by less is rounding
+
+_WITHIN = "x y r of each disc, or x y z r, with positive radii and at most 255 of them"
+
+
+class Discs(Parameter):
+    """The discs of a clump as text: x y z r of each, and a slash between two."""
+
+    __slots__ = ()
+
+    def read(self, value: Any) -> str:
+        """Return discs, from rows, text or the name of a file of rows, about their centre of area, along principal axes.
+
+        Raises
+        ------
+        ValueError
+            If they are no discs.
+        """
+        return _text(principal(_rows(value)))
+
+
+def principal(discs: ArrayLike) -> FloatArray:
+    """Move discs (n, 3) x y r to their centre of area, and balls (n, 4) x y z r to that of volume, and to principal axes.
+
+    Returns
+    -------
+    (n, 4) array of float64
+        Unchanged where they are there; else rotated by as little as possible.
+    """
+    rows = np.array(discs, np.float64)
+    if rows.shape[1] == _WIDTH:
+        is_flat = not rows[:, 2].any() and _off(rows, 2) is None
+        return rows if is_flat else _moved(rows, 3)
+    return _moved(np.insert(rows, 2, 0.0, axis=1), 2)
+
+
+def _moved(rows: FloatArray, dimension: int) -> FloatArray:
+    for _ in range(3):  # the second time corrects rounding
+        off = _off(rows, dimension)
+        if off is None:
+            break
+        centre, square = off
+        rows = np.column_stack([(rows[:, :3] - centre) @ _nearest_axes(square, dimension), rows[:, 3]])
+    return rows
+
+
+def _off(rows: FloatArray, dimension: int) -> tuple[FloatArray, FloatArray] | None:
+    """Return the centre and the second moments about it, (3, 3), over the area (volume); None if they are principal."""
+    contact = importlib.import_module("jamshape._contact")
+    measure, x, y, z, xx, yy, zz, xy, xz, yz = contact.union_moments(rows, dimension)
+    centre = np.array([x, y, z]) / measure
+    square = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) / measure
+    square -= np.outer(centre, centre)
+    size = np.sqrt(np.trace(square))
+    is_centred = (np.abs(centre) <= _PRINCIPAL * size).all()
+    off = np.abs(square - np.diag(np.diag(square))).max()
+    return None if is_centred and off <= _PRINCIPAL * size**2 else (centre, square)
+
+
+def _nearest_axes(square: FloatArray, dimension: int) -> FloatArray:
+    """Return the eigenvectors of a (3, 3) matrix, as columns, each near the axis that it replaces."""
+    found = np.eye(3)
+    _, vectors = np.linalg.eigh(square[:dimension, :dimension])
+    for k in range(dimension):
+        nearest = int(np.abs(vectors[k]).argmax())
+        found[:dimension, k] = vectors[:, nearest] * np.sign(vectors[k, nearest])
+        vectors[:, nearest] = 0.0
+    if np.linalg.det(found) < 0:
+        found[:, dimension - 1] *= -1
+    return found
+
+
+def _rows(value: Any) -> FloatArray:
+    """Return rows of discs from rows, text or a file, or raise a ValueError."""
+    if isinstance(value, str):
+        path = Path(value)
+        is_file = "/" not in value.strip("/") and path.is_file() or path.suffix and path.is_file()
+        try:
+            lines = path.read_text().splitlines() if is_file else value.split("/")
+            plain = [line.partition("#")[0].split() for line in lines]
+            value = [[float(word) for word in row] for row in plain if row]
+        except (OSError, ValueError, UnicodeDecodeError):
+            msg = f"discs are {value!r}, expected {_WITHIN}, as rows, as text such as '0 0 1/1 0 0.5', or the name of a file"
+            raise ValueError(msg) from None
+    try:
+        rows = np.array(value, np.float64)
+    except (TypeError, ValueError):
+        rows = np.empty(0)
+    is_right = rows.ndim == 2 and rows.shape[1] in {_WIDTH - 1, _WIDTH}
+    is_right = is_right and 0 < len(rows) <= MOST_NUMBERS // _WIDTH and bool(np.isfinite(rows).all())
+    if not (is_right and (rows[:, -1] > 0).all()):
+        msg = f"discs have shape {rows.shape}, expected {_WITHIN}"
+        raise ValueError(msg)
+    return rows
+
+
+def _text(rows: FloatArray) -> str:
+    return "/".join(" ".join(map(repr, row)) for row in (rows + 0.0).tolist())
+
+
+def _discs(form: FloatArray) -> FloatArray:
+    """Return the discs (n, 4) of a form (4 n,), without zeros that fill up arrays."""
+    rows = np.asarray(form).reshape(-1, _WIDTH)
+    return rows[rows[:, -1] > 0]
+
+
+def _half_extents(rows: FloatArray) -> FloatArray:
+    """(3,) half lengths of the box around discs, as balls."""
+    found: FloatArray = (np.abs(rows[:, :3]) + rows[:, 3:]).max(axis=0)
+    return found
+
+
+# Three touching discs of diameter 1.
+_TRIMER = _text(np.array([[2, 0, 0, 0], [-1, 3**0.5, 0, 0], [-1, -(3**0.5), 0, 0]]) / 12**0.5 + [0, 0, 0, 0.5])  # fmt: skip
+
+
+class Clump(Shape):
+    """Clumps: rigid unions of discs (balls in 3D) of any radii at any places, overlapping or apart.
+
+    Every pair of discs has the harmonic law of the overlap 1 - r/d. Bodies lie with their centre of area (volume) at the
+    origin, and their principal axes along x, y and z.
+    """
+
+    name = "clump"
+    parameters = (
+        Discs("discs", _TRIMER, "x y r of each disc, or x y z r of each ball: rows, text such as '0 0 1/1 0 0.5', or the name of a file", "discs", None),
+    )  # fmt: skip
+    unit = "s"
+    size_ratio = 1.4
+    has_form = True
+    examples: ClassVar = (
+        {"discs": _TRIMER},
+        {"discs": _text(np.array([[-0.35, 0, 0, 0.5], [0.35, 0, 0, 0.5]]))},
+        {"discs": _text(np.array([[x, y, 0, 0.45] for x in (-0.4, 0.4) for y in (-0.3, 0.3)]))},
+    )
+
+    def form_of_exponents(self, exponent: FloatArray) -> FloatArray:
+        """See `Shape.form_of_exponents`: there is no usual form."""
+        msg = f"form of {len(exponent)} clumps is missing, expected x y z r of the discs of each"
+        raise ValueError(msg)
+
+    def check_form(self, form: FloatArray, dimension: int) -> None:
+        """See `Shape.check_form`."""
+        columns = form.shape[1]
+        if columns % _WIDTH or not 0 < columns < MOST_NUMBERS:
+            msg = f"form has {columns} columns, expected x y z r of each disc of a clump"
+            raise ValueError(msg)
+        if dimension == 2 and form[:, 2::_WIDTH].any():
+            msg = "form of a clump in the plane has discs off z = 0, expected all at 0"
+            raise ValueError(msg)
+
+    def fits(self, diameters: FloatArray) -> bool:
+        """See `Shape.fits`; proportions depend on the form, and are checked with it."""
+        return bool((diameters > 0).all())
+
+    def rule(self) -> str:
+        """See `Shape.rule`."""
+        return "those of the box around its discs"
+
+    def sizes(
+        self, parameters: Mapping[str, Any], size: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """See `Shape.sizes`."""
+        rows = _rows(parameters["discs"])
+        extents = 2 * _half_extents(rows)
+        return size[:, None] * extents, np.tile(rows.ravel(), (len(size), 1))
+
+    def parameters_of(
+        self, diameters: FloatArray, form: FloatArray
+    ) -> tuple[dict[str, Any], float]:
+        """See `Shape.parameters_of`."""
+        rows = _discs(form)
+        return {"discs": _text(rows)}, float(diameters[0] / (2 * _half_extents(rows)[0]))
+
+    def outline(self, diameters: FloatArray, form: FloatArray, points: int = 64) -> FloatArray:
+        """See `Shape.outline`: closed curves of arcs, joined by a line there and back where there are several."""
+        contact = importlib.import_module("jamshape._contact")
+        rows = self._placed_discs(diameters, form)
+        arcs = contact.boundary_arcs(rows)
+        least = max(8, points // len(arcs))
+        pieces = [
+            rows[int(k), :2] + rows[int(k), 3] * arc(begin, end, least) for k, begin, end in arcs
+        ]
+        return _joined(pieces)
+
+    def surface(self, diameters: FloatArray, form: FloatArray, level: int = 3) -> SurfaceMesh:
+        """See `Shape.surface`."""
+        rows = self._placed_discs(diameters, form)
+
+        def height(points: FloatArray) -> FloatArray:
+            found: FloatArray = (np.linalg.norm(points[:, None] - rows[:, :3], axis=2) - rows[:, 3]).min(axis=1)
+            return found
+
+        return level_set_mesh(height, (np.abs(rows[:, :3]) + rows[:, 3:]).max(axis=0), level)
+
+    def solid(self, diameters: FloatArray, form: FloatArray) -> Balls:
+        """See `Shape.solid`."""
+        rows = self._placed_discs(diameters, form)
+        return Balls(rows[:, :3], rows[:, 3])
+
+    def label(self, parameters: Mapping[str, Any]) -> str:
+        """See `Shape.label`."""
+        n = len(_rows(parameters["discs"]))
+        return f"${n}$ disc{'s' if n > 1 else ''}"
+
+    def stem(self, parameters: Mapping[str, Any]) -> str:
+        """See `Shape.stem`."""
+        text = parameters["discs"]
+        return f"clump{len(_rows(text))}_{hashlib.sha256(text.encode()).hexdigest()[:8]}"
+
+    def _placed_discs(self, diameters: FloatArray, form: FloatArray) -> FloatArray:
+        """(n, 4) discs of a particle in its own coordinates, [length]."""
+        rows = _discs(form)
+        return rows * (diameters[0] / (2 * _half_extents(rows)[0]))
+
+
+def _joined(pieces: list[FloatArray]) -> FloatArray:
+    """Link arcs, each of which begins where another one ends, to closed curves, and these to one."""
+    ends = np.array([piece[-1] for piece in pieces])
+    begins = np.array([piece[0] for piece in pieces])
+    left, curves = set(range(len(pieces))), []
+    while left:
+        at = min(left)
+        curve = []
+        while at in left:
+            left.remove(at)
+            curve.append(pieces[at][:-1])
+            away = np.linalg.norm(begins - ends[at], axis=1)
+            at = int(away.argmin())
+        curves.append(np.concatenate(curve))
+    first = curves[0]
+    around = [np.concatenate([other, other[:1], first[:1]]) for other in curves[1:]]
+    return np.concatenate([first, first[:1] if around else first[:0], *around])
+
+
+def dimer(ratio: float = 1.0, distance: float = 1.0) -> FloatArray:
+    """Return the discs of a dimer, the first of diameter 1.
+
+    Parameters
+    ----------
+    ratio : float
+        Diameter of the second disc over that of the first.
+    distance : float
+        Between their centres, over the mean of their diameters: 1 where they just touch.
+
+    Returns
+    -------
+    (2, 3) array of float64
+        x y r.
+
+    Examples
+    --------
+    >>> dimer(0.5).tolist()
+    [[0.0, 0.0, 0.5], [0.75, 0.0, 0.25]]
+    """
+    return np.array([[0.0, 0.0, 0.5], [distance * (1 + ratio) / 2, 0.0, ratio / 2]])
+
+
+def trimer(angle: float = 60.0) -> FloatArray:
+    """Return three discs of diameter 1, the outer two touching the middle one, at an angle between them.
+
+    Parameters
+    ----------
+    angle : float, [degree]
+        60 for an equilateral triangle, 180 for a row.
+
+    Returns
+    -------
+    (3, 3) array of float64
+        x y r.
+
+    Examples
+    --------
+    >>> trimer(180)[:, 0].round(6).tolist()
+    [0.0, -1.0, 1.0]
+    """
+    half = np.deg2rad(angle) / 2
+    x, y = np.sin(half), np.cos(half)
+    return np.array([[0.0, 0.0, 0.5], [-x, -y, 0.5], [x, -y, 0.5]])
+
+
+def bumpy(bumps: int = 12, depth: float = 0.2) -> FloatArray:
+    """Return a ring of equal discs around a large one: a disc of diameter 1 with a rough surface (Papanikolaou et al. 2013).
+
+    Parameters
+    ----------
+    bumps : int
+        Number of discs on the rim.
+    depth : float
+        Depth of the notches between them over their radius: 0 is smooth; 1 where neighbours just touch.
+
+    Returns
+    -------
+    (bumps + 1, 3) array of float64
+        x y r, the large disc, which fills the middle, first.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than 3 bumps, or the depth is not above 0 and at most 1.
+
+    Examples
+    --------
+    >>> rows = bumpy(8, 0.3)
+    >>> float((rows[1:, 0] + rows[1:, 2]).max())
+    0.5
+    """
+    if bumps < 3 or not 0 < depth <= 1:
+        msg = f"bumpy has bumps={bumps} and depth={depth}, expected at least 3 and a depth above 0, up to 1"
+        raise ValueError(msg)
+    half = np.pi / bumps
+    # Bumps of radius r at distance 1/2 - r overlap so that notches are depth r below their tops.
+    gap = np.sqrt(1 - (1 - depth) ** 2)  # half the distance of neighbours over r
+    r = 0.5 * np.sin(half) / (gap + np.sin(half))
+    at = arc(0.0, 2 * np.pi, bumps + 1)[:-1] * (0.5 - r)
+    inner = (0.5 - r) * np.cos(half) + r * (1 - depth)
+    rim = np.column_stack([at, np.full(bumps, r)])
+    return np.concatenate([[[0.0, 0.0, inner]], rim])
