@@ -221,7 +221,7 @@ def _draw_particle(axes: Axes) -> None:
     """Illustrate the angle on a particle."""
     from matplotlib.patches import Arc, Polygon  # noqa: PLC0415 - not needed for --help
 
-    body = shape_named(DEFAULT).outline(np.array([3.6, 2.0, 2.0]), 1.0)
+    body = shape_named(DEFAULT).outline(np.array([3.6, 2.0, 2.0]), np.empty(0))
     axes.add_patch(Polygon(body, facecolor="0.9", edgecolor="k", lw=0.8))
     axes.plot([-0.8, 1.8], [0, 0], "k", lw=0.8)
     axes.plot([0, 0.5], [0, 1], "k", lw=0.8)

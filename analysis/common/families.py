@@ -90,7 +90,12 @@ def is_thermal(system: System) -> bool:
 
 def label(system: System) -> str:
     """Label a system in a legend by p, w1 and w2, or its parameters, and by protocol 2."""
-    shape = ", ".join(f"{value:g}" for _, value in system.parameters) or system.kinds
+    shape = (
+        ", ".join(
+            value if isinstance(value, str) else f"{value:g}" for _, value in system.parameters
+        )
+        or system.kinds
+    )
     thermal = f", protocol 2, {system.n_sweeps:g} sweeps"
     return f"$({shape})$" + thermal * is_thermal(system)
 

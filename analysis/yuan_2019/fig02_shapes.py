@@ -63,7 +63,7 @@ def body(numbers: Numbers) -> SurfaceMesh:
     p, w1, w2 = numbers
     axes = axes_from(w1, w2)
     scale = np.cbrt(4 * np.pi / 3 / volume(axes, p))
-    return with_three_axes().surface(2 * scale * axes[::-1], p, LEVEL)
+    return with_three_axes().surface(2 * scale * axes[::-1], np.array([p]), LEVEL)
 
 
 def draw_body(axes: Axes, mesh: SurfaceMesh, color: FloatArray) -> None:

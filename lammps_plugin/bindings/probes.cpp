@@ -1,5 +1,6 @@
 // Contact geometry of single pairs, row by row, called only by tests and measurements of errors.
 
+#include "contact/clump/form.hpp"
 #include "contact/extended.hpp"
 #include "contact/spherocylinder/spherocylinder.hpp"
 #include "contact/superellipsoid/superellipsoid.hpp"
@@ -317,6 +318,42 @@ nb::object counts_of_team(std::int64_t asked, std::size_t first_that_fails, int 
   return nb::make_tuple(counts.release(), failed.c_str());
 }
 
+std::vector<Ball> discs_in(const Array2<double> &rows, int dimension)
+{
+  require(rows.shape(1) == 4, "discs do not have the shape (n, 4), x y z r of each.");
+  require(dimension == 2 || dimension == 3,
+          "dimension is " + std::to_string(dimension) + ", expected 2 or 3.");
+  const auto discs = read_discs({rows.data(), rows.data() + rows.size()}, dimension);
+  require(discs.has_value(), "discs hold a row that is no disc, expected x y z r of 1 to " +
+                                 std::to_string(MOST_DISCS) +
+                                 " of them with positive radii, in 2D with z = 0.");
+  return *discs;
+}
+
+nb::object union_moments(const Array2<double> &rows, int dimension)
+{
+  const Moments found = moments_of(discs_in(rows, dimension), dimension);
+  NewArray<double> values({10});
+  values[0] = found.measure;
+  for (int k = 0; k < 3; ++k) values[1 + k] = found.first[k];
+  for (int k = 0; k < 6; ++k) values[4 + k] = found.second[k];
+  return values.release();
+}
+
+nb::object boundary_arcs(const Array2<double> &rows)
+{
+  const std::vector<Ball> discs = discs_in(rows, 2);
+  std::vector<double> found;
+  for (std::size_t k = 0; k < discs.size(); ++k) {
+    for (const auto &[from, to] : detail::free_arcs(discs, k)) {
+      found.insert(found.end(), {static_cast<double>(k), from, to});
+    }
+  }
+  NewArray<double> arcs({found.size() / 3, 3});
+  for (std::size_t n = 0; n < found.size(); ++n) arcs[n] = found[n];
+  return arcs.release();
+}
+
 }  // namespace
 
 void export_probes(nb::module_ &m)
@@ -353,6 +390,14 @@ void export_probes(nb::module_ &m)
         "Rounds in which each thread did its part (threads,), if those from first_that_fails on "
         "fail\n"
         "in all rounds but the last, and the last exception.");
+  m.def("union_moments", &union_moments, "discs"_a, "dimension"_a,
+        "Integrals over a union of discs (n, 4), x y z r of each, balls in 3D: of 1, x, y, z, xx, "
+        "yy,\n"
+        "zz, xy, xz, yz (10,).");
+  m.def(
+      "boundary_arcs", &boundary_arcs, "discs"_a,
+      "Arcs of the boundary of a union of discs (n, 4) in the plane (M, 3): index of the disc and\n"
+      "the angles at both ends, counter-clockwise.");
 }
 
 }  // namespace jamshape

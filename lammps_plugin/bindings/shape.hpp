@@ -57,9 +57,8 @@ template <class Model> class ShapeOf {
   using Shape = typename Model::Shape;
   using Law = typename Model::Law;
 
-  ShapeOf(const Array2<double> &diameters, const Array2<double> &form, int dimension,
-          double k_e, int sides) :
-      ShapeOf(diameters, form, dimension, Laws<Law>(law_of<Model>(k_e, sides)))
+  ShapeOf(const Array2<double> &diameters, const Array2<double> &form, int dimension, double k_e,
+          int sides) : ShapeOf(diameters, form, dimension, Laws<Law>(law_of<Model>(k_e, sides)))
   {
   }
 

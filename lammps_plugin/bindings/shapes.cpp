@@ -1,7 +1,5 @@
 #include "contact/shapes.hpp"
 
-#include "contact/clump/form.hpp"
-
 #include "contact/extended.hpp"
 #include "contact/host_spin.hpp"
 
@@ -204,52 +202,15 @@ template <class Model> void export_pairs(nb::class_<ShapeOf<Model>> &of)
       "normal; torque_error, to these and the point of contact; NaN without a contact.");
 }
 
-std::vector<Ball> discs_in(const Array2<double> &rows, int dimension)
-{
-  require(rows.shape(1) == 4, "discs do not have the shape (n, 4), x y z r of each.");
-  require(dimension == 2 || dimension == 3,
-          "dimension is " + std::to_string(dimension) + ", expected 2 or 3.");
-  const auto discs = read_discs({rows.data(), rows.data() + rows.size()}, dimension);
-  require(discs.has_value(),
-          "discs hold a row that is no disc, expected x y z r of 1 to " +
-              std::to_string(MOST_DISCS) + " of them with positive radii, in 2D with z = 0.");
-  return *discs;
-}
-
-nb::object union_moments(const Array2<double> &rows, int dimension)
-{
-  const Moments found = moments_of(discs_in(rows, dimension), dimension);
-  NewArray<double> values({10});
-  values[0] = found.measure;
-  for (int k = 0; k < 3; ++k) values[1 + k] = found.first[k];
-  for (int k = 0; k < 6; ++k) values[4 + k] = found.second[k];
-  return values.release();
-}
-
-nb::object boundary_arcs(const Array2<double> &rows)
-{
-  const std::vector<Ball> discs = discs_in(rows, 2);
-  std::vector<double> found;
-  for (std::size_t k = 0; k < discs.size(); ++k) {
-    for (const auto &[from, to] : detail::free_arcs(discs, k)) {
-      found.insert(found.end(), {static_cast<double>(k), from, to});
-    }
-  }
-  NewArray<double> arcs({found.size() / 3, 3});
-  for (std::size_t n = 0; n < found.size(); ++n) arcs[n] = found[n];
-  return arcs.release();
-}
-
 template <class Model> void export_shape(nb::module_ &m)
 {
   using namespace nb::literals;
   using Self = ShapeOf<Model>;
   nb::class_<Self> of(m, class_name<Model>().c_str(), Model::SHAPE_RULE);
-  of.def(
-      nb::init<const Array2<double> &, const Array2<double> &, int, double, int>(), "diameters"_a,
-      "form"_a, "dimension"_a, "k_e"_a, "sides"_a,
-      "Particles of diameters (N, 3) and further numbers (N, K), such as exponents; sides is\n"
-      "1 or 2, the bonds of a side-to-side contact, for shapes whose law supports both.");
+  of.def(nb::init<const Array2<double> &, const Array2<double> &, int, double, int>(),
+         "diameters"_a, "form"_a, "dimension"_a, "k_e"_a, "sides"_a,
+         "Particles of diameters (N, 3) and further numbers (N, K), such as exponents; sides is\n"
+         "1 or 2, the bonds of a side-to-side contact, for shapes whose law supports both.");
   of.def(nb::init<const Array2<double> &, const Array2<double> &, int, const Array2<double> &,
                   const Array1<std::int64_t> &, int>(),
          "diameters"_a, "form"_a, "dimension"_a, "k_e"_a, "species"_a, "sides"_a,
@@ -267,14 +228,7 @@ template <class Model> void export_shape(nb::module_ &m)
 
 void export_shapes(nb::module_ &m)
 {
-  using namespace nb::literals;
   Shapes::each([&](auto model) { export_shape<decltype(model)>(m); });
-  m.def("union_moments", &union_moments, "discs"_a, "dimension"_a,
-        "Integrals over a union of discs (n, 4), x y z r of each, balls in 3D: of 1, x, y, z, xx, yy,\n"
-        "zz, xy, xz, yz (10,).");
-  m.def("boundary_arcs", &boundary_arcs, "discs"_a,
-        "Arcs of the boundary of a union of discs (n, 4) in the plane (M, 3): index of the disc and\n"
-        "the angles at both ends, counter-clockwise.");
 }
 
 }  // namespace jamshape

@@ -22,8 +22,8 @@ enum class ContactKind { TIP_TO_TIP = 0, TIP_TO_SIDE = 1, SIDE_TO_SIDE = 2 };
 /// Fig. 6). Others ignore it.
 enum class Sides { ONE = 1, TWO = 2 };
 
-/// Numbers of a particle beside its three semi-axes, such as exponents: in LAMMPS by type, in Python
-/// a row of `Packing.form`. A model makes its `Form` of them.
+/// Numbers of a particle beside its three semi-axes, such as exponents: in LAMMPS by type, in
+/// Python a row of `Packing.form`. A model makes its `Form` of them.
 using FormNumbers = std::vector<double>;
 
 /// The form of shapes that are given by their semi-axes alone.

@@ -75,8 +75,8 @@ template <class Model, int D> class StoredBodies {
   std::vector<Body> now;
 };
 
-/// The same for large bodies: each kind of shape (semi-axes and form) is stored once, and bodies are
-/// assembled on demand, from LAMMPS's positions and the last orientations read.
+/// The same for large bodies: each kind of shape (semi-axes and form) is stored once, and bodies
+/// are assembled on demand, from LAMMPS's positions and the last orientations read.
 template <class Model, int D> class AssembledBodies {
  public:
   using Body = typename Model::template Body<D>;

@@ -12,9 +12,10 @@
 
 namespace jamshape {
 
-/// The command `create_random SHAPE N PHI SEED type SHARE DX DY DZ [form NUMBER ...] ...`: a periodic
-/// box with non-overlapping particles at random positions and orientations. Every rank finds all
-/// positions and keeps its own, so that a seed gives the same state on any number of ranks.
+/// The command `create_random SHAPE N PHI SEED type SHARE DX DY DZ [form NUMBER ...] ...`: a
+/// periodic box with non-overlapping particles at random positions and orientations. Every rank
+/// finds all positions and keeps its own, so that a seed gives the same state on any number of
+/// ranks.
 class CreateRandom : public LAMMPS_NS::Command {
  public:
   explicit CreateRandom(LAMMPS_NS::LAMMPS *lmp) : Command(lmp), view(lmp) {}

@@ -14,7 +14,10 @@ class PairClumpHarmonic : public PairContactOf<ClumpModel> {
   using PairContactOf::PairContactOf;
 
  protected:
-  std::string without_force() const override { return "coinciding discs, or more than 16 pairs of discs that touch"; }
+  std::string without_force() const override
+  {
+    return "coinciding discs, or more than 16 pairs of discs that touch";
+  }
 };
 
 const PairStyle<PairClumpHarmonic> listed;

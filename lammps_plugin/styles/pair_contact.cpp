@@ -156,8 +156,7 @@ std::string PairContact::coeff_rule() const
   return "'" + plain + "' or 'I I " + energy_name() + " " + form_name() + "'";
 }
 
-/// Numbers, or the name of a file of them, belong to a type: to all types of a line whose I and J
-/// are the same.
+/// The numbers of a type, or of all types of a line whose I and J are the same.
 void PairContact::read_form(int narg, char **arg)
 {
   const std::string text = joined(narg - 3, arg + 3);
@@ -637,7 +636,7 @@ std::vector<LocalBond> PairContact::reported_bonds()
 
 /* ---------------------------------------------------------------------- */
 
-/// For shapes that have numbers of types: their number, negative, and they. (Version 0.1 had an
+/// Numbers of types, for shapes that have them: first how many, negative. (Version 0.1 had an
 /// exponent of each type alone, which is positive.)
 void PairContact::write_forms(FILE *fp) const
 {
@@ -663,12 +662,12 @@ void PairContact::read_forms(FILE *fp)
   }
 }
 
-/// LAMMPS reads lines of limited length from data files: longer ones stay with the deck.
-std::string PairContact::more_coefficients(int type) const
+/// The numbers of a type as text, none if it is longer.
+std::string PairContact::more_coefficients(int type, std::size_t longest) const
 {
   std::string text;
   for (const double number : form(type)) text += " " + exactly(number);
-  return text.size() < LONGEST_COEFFICIENTS ? text : "";
+  return text.size() < longest ? text : "";
 }
 
 void PairContact::write_restart(FILE *fp)
@@ -702,15 +701,18 @@ void PairContact::read_restart(FILE *fp)
 void PairContact::write_data(FILE *fp)
 {
   for (int i = 1; i <= atom->ntypes; ++i) {
-    std::fprintf(fp, "%d %s%s\n", i, exactly(k_e[i][i]).c_str(), more_coefficients(i).c_str());
+    const std::string more = more_coefficients(i, LONGEST_COEFFICIENTS);
+    std::fprintf(fp, "%d %s%s\n", i, exactly(k_e[i][i]).c_str(), more.c_str());
   }
 }
 
-void PairContact::write_data_all(FILE *fp)
+void PairContact::write_data_all(FILE *fp) { write_pairs(fp, LONGEST_COEFFICIENTS); }
+
+void PairContact::write_pairs(FILE *fp, std::size_t longest) const
 {
   for (int i = 1; i <= atom->ntypes; ++i) {
     for (int j = i; j <= atom->ntypes; ++j) {
-      const std::string more = i == j ? more_coefficients(i) : "";
+      const std::string more = i == j ? more_coefficients(i, longest) : "";
       std::fprintf(fp, "%d %d %s%s\n", i, j, exactly(k_e[i][j]).c_str(), more.c_str());
     }
   }

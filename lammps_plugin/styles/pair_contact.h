@@ -8,6 +8,7 @@
 #include "pair.h"
 #include "particle_view.h"
 
+#include <cstddef>
 #include <functional>
 #include <map>
 #include <optional>
@@ -61,6 +62,9 @@ class PairContact : public LAMMPS_NS::Pair {
   void read_restart(FILE *fp) override;
   void write_data(FILE *fp) override;
   void write_data_all(FILE *fp) override;
+  /// The coefficients of all pairs of types, a line each, without numbers of a type that are
+  /// longer.
+  void write_pairs(FILE *fp, std::size_t longest) const;
   void *extract(const char *name, int &dimension) override;
   double memory_usage() override;
 
@@ -135,7 +139,7 @@ class PairContact : public LAMMPS_NS::Pair {
   const FormNumbers &form(int type) const { return form_of[type]; }
   /// Takes the numbers of a type; returns false, with everything as before, if they are none.
   virtual bool take_form(int type, const FormNumbers &numbers) = 0;
-  /// What they are, empty for shapes without, and a description of the required ones.
+  /// Name of these numbers, empty for shapes without, and a description of the required ones.
   virtual std::string form_name() const = 0;
   virtual std::string form_rule() const = 0;
 
@@ -192,7 +196,7 @@ class PairContact : public LAMMPS_NS::Pair {
   void set_form(int type, const FormNumbers &numbers, const std::string &text);
   void write_forms(FILE *fp) const;
   void read_forms(FILE *fp);
-  std::string more_coefficients(int type) const;
+  std::string more_coefficients(int type, std::size_t longest) const;
   void require_lasting_types() const;
   void choose_instructions();
   void measure_particles();

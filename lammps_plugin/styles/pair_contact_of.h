@@ -469,7 +469,7 @@ template <class Model> class PairContactOf : public PairContact {
     return std::exchange(shapes, checksum) != checksum;
   }
 
-  /// For each type, the first one of the same form.
+  /// The first type of the same form, for each type.
   std::vector<int> first_types_of_forms() const
   {
     std::vector<int> first_one(atom->ntypes + 1, 0);

@@ -245,7 +245,7 @@ const char *jamshape_pair(void *handle)
   std::size_t size = 0;
   FILE *const file = open_memstream(&rows, &size);
   if (file == nullptr) return text.c_str();
-  pair->write_data_all(file);
+  pair->write_pairs(file, std::string::npos);
   std::fclose(file);
   text = std::string(lmp->force->pair_style) + pair->settings_text() + "\n" + rows;
   std::free(rows);

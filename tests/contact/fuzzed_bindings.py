@@ -97,9 +97,9 @@ def over_pairs(fuzz, of, given):
 
 def of_shapes(fuzz):
     shape, dimension = fuzz.one_of(list(SHAPES)), fuzz.one_of((2, 3))
-    rows = np.tile(SHAPES[shape], (3, 1))
+    rows, form = (np.tile(row, (3, 1)) for row in SHAPES[shape])
     made = fuzz.call(
-        "shape", shape, diameters=rows, exponent=np.ones(3), dimension=dimension, k_e=1.0, sides=2
+        "shape", shape, diameters=rows, form=form, dimension=dimension, k_e=1.0, sides=2
     )
     of = particles(shape, dimension) if made is None else made
     with contextlib.suppress(ValueError, RuntimeError):

@@ -13,16 +13,17 @@ from jamshape import _contact
 BAD_NUMBERS = (np.nan, np.inf, -np.inf)
 N = 3
 SHAPES = {
-    _contact.Spherocylinders: (4.0, 2.0, 2.0),
-    _contact.Superellipsoids: (4.0, 2.0, 3.0),
-    _contact.Dimers: (4.0, 2.0, 2.0),
+    _contact.Spherocylinders: ((4.0, 2.0, 2.0), ()),
+    _contact.Superellipsoids: ((4.0, 2.0, 3.0), (1.0,)),
+    _contact.Dimers: ((4.0, 2.0, 2.0), ()),
+    _contact.Clumps: ((4.0, 2.0, 2.0), (-1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0)),
 }
 every_shape = pytest.mark.parametrize("shape", list(SHAPES), ids=lambda x: x.__name__)
 in_each_space = pytest.mark.parametrize("dimension", [2, 3])
 
 
 def particles(shape, dimension, k_e=1.0):
-    return shape(np.tile(SHAPES[shape], (N, 1)), np.ones(N), dimension, k_e, 1)
+    return shape(*(np.tile(row, (N, 1)) for row in SHAPES[shape]), dimension, k_e, 1)
 
 
 def poses(dimension):

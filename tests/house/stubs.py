@@ -1,5 +1,6 @@
 """Write the stubs of what the table of shapes decides, from the table; `./run setup` does so, and a test compares."""
 
+import inspect
 from pathlib import Path
 
 import jamshape
@@ -21,8 +22,15 @@ from jamshape.shapes.particles import Particles
 def stub(shape):
     """Declare the function that makes particles of a shape, an argument a line as the formatter leaves it."""
     signature = signature_of(shape)
-    arguments = "".join(f"    {p},\n" for p in signature.parameters.values())
+    arguments = "".join(f"    {declared(p)},\n" for p in signature.parameters.values())
     return f"def {shape.compiled_name}(\n{arguments}) -> Particles: ...\n".replace("'", "")
+
+
+def declared(parameter):
+    """Declare an argument, without a text that it is by default."""
+    is_text = isinstance(parameter.default, str)
+    text = str(parameter.replace(default=inspect.Parameter.empty) if is_text else parameter)
+    return text + " = ..." * is_text
 
 
 def stubs():

@@ -39,7 +39,8 @@ def lone(case):
 def alike(found, expected, rounding=1e-12):
     """Whether parameters agree: numbers up to rounding, texts exactly."""
     return found.keys() == expected.keys() and all(
-        value == (other if isinstance(other, str) else pytest.approx(other, rel=rounding, abs=rounding))
+        value
+        == (other if isinstance(other, str) else pytest.approx(other, rel=rounding, abs=rounding))
         for value, other in ((found[name], expected[name]) for name in expected)
     )
 
@@ -233,8 +234,7 @@ def test_mixtures_hold_all_examples(case):
         own = np.flatnonzero(packing.species == kind)
         assert len(np.unique(packing.diameters[own], axis=0)) > 1  # sizes are spread
         told = [
-            SHAPES[case.shape].parameters_of(packing.diameters[i], packing.form[i])[0]
-            for i in own
+            SHAPES[case.shape].parameters_of(packing.diameters[i], packing.form[i])[0] for i in own
         ]
         found.append(told[0])
         for one in told:

@@ -148,7 +148,7 @@ struct ClumpModel {
   static constexpr const char *CORE = "centres of discs";
   static constexpr int MOST_BONDS = MOST_BONDS_OF_CLUMPS;
   static constexpr bool HAS_SIDES = false;
-  /// As for dimers.
+  /// Whether each bond constrains like a contact of its own, as of dimers.
   static constexpr bool BONDS_ARE_CONTACTS = true;
   static constexpr int OVERLAP_POWER = 1;
 

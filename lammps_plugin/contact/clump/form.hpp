@@ -20,7 +20,7 @@ struct Discs {
   int dimension;
   std::vector<Ball> ball;
   SubstrateDrag drag;
-  Vec<3> half_extents;  // of the box around them, along the principal axes
+  Vec<3> half_extents;    // of the box around them, along the principal axes
   double farthest = 0.0;  // centre of a disc
   double outer = 0.0;     // radius of the circle around all
   double smallest = 0.0;  // radius
@@ -58,8 +58,8 @@ inline bool are_principal(const Moments &of, int dimension)
 /// Discs per body that a search may take.
 inline constexpr std::size_t MOST_DISCS = 255;
 
-/// Reads rows x y z r of discs, with z = 0 in 2D; nothing if they are none. Rows of zeros at the end
-/// fill up arrays.
+/// Reads rows x y z r of discs, with z = 0 in 2D; nothing if they are none. Rows of zeros at the
+/// end fill up arrays.
 inline std::optional<std::vector<Ball>> read_discs(const FormNumbers &numbers, int dimension)
 {
   constexpr std::size_t WIDTH = 4;

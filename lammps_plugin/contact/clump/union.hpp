@@ -69,10 +69,11 @@ inline std::vector<std::pair<double, double>> free_arcs(const std::vector<Ball> 
     const double dy = discs[l].centre[1] - discs[k].centre[1];
     const double R = discs[k].radius, other = discs[l].radius, d = std::hypot(dx, dy);
     if (l == k || d >= R + other) continue;
-    if (d + R <= other && (d + other > R || l < k)) return {};  // of equal discs the first one stays
+    if (d + R <= other && (d + other > R || l < k))
+      return {};  // of equal discs the first one stays
     if (d + other <= R) continue;
-    const double half = std::acos(
-        std::clamp((R * R + d * d - other * other) / (2.0 * R * d), -1.0, 1.0));
+    const double half =
+        std::acos(std::clamp((R * R + d * d - other * other) / (2.0 * R * d), -1.0, 1.0));
     cover(std::atan2(dy, dx) - half, std::atan2(dy, dx) + half);
   }
   std::sort(covered.begin(), covered.end());

@@ -136,7 +136,15 @@ def from_ovito(data: Any) -> Packing:
             "edges": lengths.edges,
             "tilt": lengths.tilt,
         }
-        names = ("orientation", "diameters", "exponent", "form", "species", "image", *PARTICLE_RESTS)
+        names = (
+            "orientation",
+            "diameters",
+            "exponent",
+            "form",
+            "species",
+            "image",
+            *PARTICLE_RESTS,
+        )
         for name in names:
             title = _PREFIX + name.replace("_", " ")
             if name not in (*PARTICLE_RESTS, "exponent", "form") or title in particles:

@@ -30,7 +30,7 @@ class System(NamedTuple):
 
     shape: str
     dimension: int
-    parameters: tuple[tuple[str, float], ...]
+    parameters: tuple[tuple[str, float | str], ...]
     """Parameters of the shape by name; empty for a mixture, and if files lack some."""
     kinds: str = ""
     """Particles of a mixture."""
@@ -41,7 +41,8 @@ class System(NamedTuple):
 
     def number(self, name: str) -> float:
         """Look up a parameter; NaN if the shape does not have it."""
-        return dict(self.parameters).get(name, math.nan)
+        value = dict(self.parameters).get(name)
+        return value if isinstance(value, float) else math.nan
 
     def without(self, name: str) -> System:
         """Remove a parameter, so that the points of a curve over it compare equal."""

@@ -182,8 +182,8 @@ def _forms_text(packing: Packing) -> str:
     lines = []
     for number, form in enumerate(_forms(packing)[0], 1):
         words = [f"{x:.17g}" for x in form]
-        for k in range(0, len(words), _NUMBERS_IN_LINE):
-            lines.append(f"# form {number}: {' '.join(words[k : k + _NUMBERS_IN_LINE])}")
+        parts = (words[k : k + _NUMBERS_IN_LINE] for k in range(0, len(words), _NUMBERS_IN_LINE))
+        lines += [f"# form {number}: {' '.join(part)}" for part in parts]
     return "\n".join(["", *lines, ""])
 
 
@@ -422,8 +422,7 @@ def _packing(path: PathLike, frame: _Frame, wanted: Wanted) -> Packing:
         image=_whole(stack(_IMAGE[:dimension])) if has_image else np.empty((0, 0), np.int64),
         box=Box(lo=lo, edges=hi - lo, tilt=frame.tilt[: 1 if dimension == 2 else 3]),
         shape_style=shape.name,
-        exponent=exponent,
-        form=form,
+        form=SHAPES[shape.name].form_of_exponents(exponent) if len(exponent) else form,
         law=law,
         step=frame.step,
         time=frame.time,

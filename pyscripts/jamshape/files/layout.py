@@ -291,9 +291,7 @@ def _read_columns(file: h5py.File, frame: int, n: int) -> dict[str, NDArray[Any]
 _MOST_COLUMNS = 4  # numbers of a particle in one array, or of a row of a box
 
 
-def _require_most(
-    dataset: Any, shape: tuple[int, ...], n: int, most: int = _MOST_COLUMNS
-) -> None:
+def _require_most(dataset: Any, shape: tuple[int, ...], n: int, most: int = _MOST_COLUMNS) -> None:
     """Refuse an array larger than n particles need, before it is read."""
     if math.prod(shape) > max(n, _MOST_COLUMNS) * most:
         msg = (

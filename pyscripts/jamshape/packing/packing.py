@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import InitVar, dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -64,7 +64,14 @@ class Packing(Record):
     results: Mapping[str, Any] = field(default_factory=dict)
     file: Path | None = None
     columns: Mapping[str, Any] = field(default_factory=dict)
-    exponent: InitVar[FloatArray | None] = None
+    if TYPE_CHECKING:
+
+        @property
+        def exponent(self) -> FloatArray:
+            """(N,) exponents p of superellipsoids; ones for other shapes."""
+
+    else:
+        exponent: InitVar[FloatArray | None] = None
 
     def __post_init__(self, exponent: FloatArray | None) -> None:
         n = len(np.atleast_1d(real_numbers("position", self.position)))
@@ -278,7 +285,7 @@ class Packing(Record):
         for name, rests in _REST_OF.items():
             for rest in rests if name in changes else ():
                 changes.setdefault(rest, np.empty(0))
-        unset = {"results": {}, "file": None, "exponent": None}
+        unset: dict[str, Any] = {"results": {}, "file": None, "exponent": None}
         return dataclasses.replace(self, **(unset | changes))
 
     @property
@@ -287,13 +294,13 @@ class Packing(Record):
         return {k: v for k, v in self.results.items() if k not in {"kind", "finished"}}
 
 
-# Declared after the class, whose constructor takes it by the same name.
 def _exponent(packing: Packing) -> FloatArray:
     """(N,) exponents p of superellipsoids; ones for other shapes."""
     return packing.form[:, 0] if packing.shape.has_exponent else np.ones(packing.n)
 
 
-Packing.exponent = property(_exponent)  # type: ignore[assignment]
+# Set behind the class, whose constructor takes an argument of this name.
+setattr(Packing, "exponent", property(_exponent))  # noqa: B010
 
 
 def _form_of(packing: Packing, exponent: FloatArray | None, n: int) -> FloatArray:

@@ -46,8 +46,10 @@ class Bodies(NamedTuple):
                 expected = ", ".join(p.option for p in shape.parameters)
                 msg = f"{name} is not a parameter of {shape.name}s, expected {expected}"
                 raise ValueError(msg)
-        given = {
-            known[name].name: known[name].read(value) if known[name].allowed is None else _parameter(known[name], value, n)
+        given: dict[str, Any] = {
+            known[name].name: known[name].read(value)
+            if known[name].allowed is None
+            else _parameter(known[name], value, n)
             for name, value in parameters.items()
         }
         if diameters is not None:

@@ -9,7 +9,7 @@ import hashlib
 import importlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -63,7 +63,9 @@ def _moved(rows: FloatArray, dimension: int) -> FloatArray:
         if off is None:
             break
         centre, square = off
-        rows = np.column_stack([(rows[:, :3] - centre) @ _nearest_axes(square, dimension), rows[:, 3]])
+        rows = np.column_stack(
+            [(rows[:, :3] - centre) @ _nearest_axes(square, dimension), rows[:, 3]]
+        )
     return rows
 
 
@@ -97,7 +99,9 @@ def _rows(value: Any) -> FloatArray:
     """Return rows of discs from rows, text or a file, or raise a ValueError."""
     if isinstance(value, str):
         path = Path(value)
-        is_file = "/" not in value.strip("/") and path.is_file() or path.suffix and path.is_file()
+        is_file = ("/" not in value.strip("/") and path.is_file()) or (
+            path.suffix and path.is_file()
+        )
         try:
             lines = path.read_text().splitlines() if is_file else value.split("/")
             plain = [line.partition("#")[0].split() for line in lines]
@@ -110,7 +114,9 @@ def _rows(value: Any) -> FloatArray:
     except (TypeError, ValueError):
         rows = np.empty(0)
     is_right = rows.ndim == 2 and rows.shape[1] in {_WIDTH - 1, _WIDTH}
-    is_right = is_right and 0 < len(rows) <= MOST_NUMBERS // _WIDTH and bool(np.isfinite(rows).all())
+    is_right = (
+        is_right and 0 < len(rows) <= MOST_NUMBERS // _WIDTH and bool(np.isfinite(rows).all())
+    )
     if not (is_right and (rows[:, -1] > 0).all()):
         msg = f"discs have shape {rows.shape}, expected {_WITHIN}"
         raise ValueError(msg)
@@ -151,7 +157,7 @@ class Clump(Shape):
     unit = "s"
     size_ratio = 1.4
     has_form = True
-    examples: ClassVar = (
+    examples = (
         {"discs": _TRIMER},
         {"discs": _text(np.array([[-0.35, 0, 0, 0.5], [0.35, 0, 0, 0.5]]))},
         {"discs": _text(np.array([[x, y, 0, 0.45] for x in (-0.4, 0.4) for y in (-0.3, 0.3)]))},
@@ -211,7 +217,9 @@ class Clump(Shape):
         rows = self._placed_discs(diameters, form)
 
         def height(points: FloatArray) -> FloatArray:
-            found: FloatArray = (np.linalg.norm(points[:, None] - rows[:, :3], axis=2) - rows[:, 3]).min(axis=1)
+            found: FloatArray = (
+                np.linalg.norm(points[:, None] - rows[:, :3], axis=2) - rows[:, 3]
+            ).min(axis=1)
             return found
 
         return level_set_mesh(height, (np.abs(rows[:, :3]) + rows[:, 3:]).max(axis=0), level)
@@ -234,7 +242,7 @@ class Clump(Shape):
     def _placed_discs(self, diameters: FloatArray, form: FloatArray) -> FloatArray:
         """(n, 4) discs of a particle in its own coordinates, [length]."""
         rows = _discs(form)
-        return rows * (diameters[0] / (2 * _half_extents(rows)[0]))
+        return np.asarray(rows * (diameters[0] / (2 * _half_extents(rows)[0])))
 
 
 def _joined(pieces: list[FloatArray]) -> FloatArray:

@@ -12,7 +12,10 @@ from jamshape.shapes.mesh import SurfaceMesh
 
 # A cube is cut into six tetrahedra about its diagonal, each along one order of the axes.
 _TETRAHEDRA = np.array(
-    [np.cumsum([[0, 0, 0], *np.eye(3, dtype=int)[list(order)]], axis=0) for order in itertools.permutations(range(3))]
+    [
+        np.cumsum([[0, 0, 0], *np.eye(3, dtype=int)[list(order)]], axis=0)
+        for order in itertools.permutations(range(3))
+    ]
 )
 _CELLS = 6  # along the longest edge, at level 0; each level has twice as many
 _AROUND = 1.1  # the box of the grid over that of the body
@@ -47,8 +50,8 @@ def level_set_mesh(
     number = np.arange(len(value)).reshape(counts + 1)
     stride = np.array([number[1, 0, 0], number[0, 1, 0], number[0, 0, 1]])
     inside = value.reshape(counts + 1) < 0
-    corners = (tuple(slice(s, n + s) for s, n in zip(shift, counts, strict=True)) for shift in itertools.product((0, 1), repeat=3))  # fmt: skip
-    cut = [inside[at] for at in corners]
+    places = (tuple(slice(s, n + s) for s, n in zip(shift, counts, strict=True)) for shift in itertools.product((0, 1), repeat=3))  # fmt: skip
+    cut = [inside[at] for at in places]
     near = np.any(cut, axis=0) & ~np.all(cut, axis=0)
     origin = number[:-1, :-1, :-1][near]
     four = (origin[:, None, None] + (_TETRAHEDRA @ stride)[None]).reshape(-1, 4)

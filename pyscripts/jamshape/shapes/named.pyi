@@ -22,7 +22,7 @@ def Dimers(
     **kinds: ArrayLike,
 ) -> Particles: ...
 def Clumps(
-    discs: ArrayLike = 0.5773502691896258 0.0 0.0 0.5/-0.2886751345948129 0.5 0.0 0.5/-0.2886751345948129 -0.5 0.0 0.5,
+    discs: ArrayLike = ...,
     size_ratio: float | None = None,
     **kinds: ArrayLike,
 ) -> Particles: ...

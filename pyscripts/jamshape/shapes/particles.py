@@ -215,7 +215,9 @@ def parse_kind(text: str) -> Kind:
     except ValueError:
         msg = f"a kind is {text!r}, expected numbers by name such as alpha=4,size=1.4,share=0.5"
         raise ValueError(msg) from None
-    own = {name: float(numbers.pop(name)) for name in ("size", "share", "spread") if name in numbers}
+    own = {
+        name: float(numbers.pop(name)) for name in ("size", "share", "spread") if name in numbers
+    }
     return Kind(numbers, **own)
 
 

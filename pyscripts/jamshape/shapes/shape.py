@@ -204,7 +204,7 @@ class Shape(ABC):
     parameters: ClassVar[tuple[Parameter, ...]]
     unit: ClassVar[str]
     """Length that equals 1 for a particle of size 1."""
-    examples: ClassVar[tuple[Mapping[str, float], ...]]
+    examples: ClassVar[tuple[Mapping[str, Any], ...]]
     """Parameters for tests, most typical first; together they take all code paths of its contacts."""
     dimension: ClassVar[int] = 2
     """Default dimension of packings."""
@@ -312,7 +312,7 @@ class Shape(ABC):
 
     @abstractmethod
     def sizes(
-        self, parameters: Mapping[str, float | FloatArray], size: FloatArray
+        self, parameters: Mapping[str, Any], size: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Convert parameters, numbers or (n,), and (n,) sizes to (n, 3) diameters and (n, K) forms.
 
@@ -325,7 +325,7 @@ class Shape(ABC):
     @abstractmethod
     def parameters_of(
         self, diameters: FloatArray, form: FloatArray
-    ) -> tuple[dict[str, float], float]:
+    ) -> tuple[dict[str, Any], float]:
         """Return parameters and size of a particle from (3,) diameters and its (K,) form: the inverse of `sizes`."""
 
     def style(self, packing: Any, law: Interaction) -> Style:
@@ -369,12 +369,12 @@ class Shape(ABC):
         del diameters
         return 0.0
 
-    def label(self, parameters: Mapping[str, float]) -> str:
+    def label(self, parameters: Mapping[str, Any]) -> str:
         """Format parameters in TeX, for a legend."""
         told = [f"{p.symbol}={parameters[p.name]:g}" for p in self.parameters]
         return f"${', '.join(told)}$"
 
-    def stem(self, parameters: Mapping[str, float]) -> str:
+    def stem(self, parameters: Mapping[str, Any]) -> str:
         """Return the stem of file names for packings of such particles."""
         numbers = [p.option + in_name(parameters[p.name]) for p in self.parameters]
         return "_".join([self.name, *numbers])
@@ -422,7 +422,7 @@ class ElongatedShape(Shape):
         return "(2(A+R), 2R, 2R) with A >= 0"
 
     def sizes(
-        self, parameters: Mapping[str, float | FloatArray], size: FloatArray
+        self, parameters: Mapping[str, Any], size: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """See `Shape.sizes`."""
         radius = 0.5 * size
@@ -432,7 +432,7 @@ class ElongatedShape(Shape):
 
     def parameters_of(
         self, diameters: FloatArray, form: FloatArray
-    ) -> tuple[dict[str, float], float]:
+    ) -> tuple[dict[str, Any], float]:
         """See `Shape.parameters_of`."""
         del form
         width = float(diameters[1])

@@ -6,13 +6,12 @@ Marschall & Teitel, Phys. Rev. E 97, 012905 (2018). Contacts: `lammps_plugin/con
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from jamshape.arrays import FloatArray
 from jamshape.shapes.mesh import SurfaceMesh, arc, revolved
-from jamshape.shapes.shape import ElongatedShape, Interaction, Style, in_name
+from jamshape.shapes.shape import ElongatedShape, Interaction, in_name
 from jamshape.shapes.solid import RoundedSegment
 
 

@@ -6,7 +6,6 @@ Yuan, VanderWerf, Shattuck & O'Hern, Soft Matter (2019). Contacts: `lammps_plugi
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -15,12 +14,9 @@ from jamshape.checks import Range
 from jamshape.shapes.mesh import SurfaceMesh, arc
 from jamshape.shapes.roundness import asphericity, axes_from, reduced_aspect_ratio
 from jamshape.shapes.shape import (
-    Interaction,
     Parameter,
     Shape,
-    Style,
     in_name,
-    pair_coefficients,
 )
 from jamshape.shapes.solid import Superquadric
 from jamshape.shapes.superellipsoid_surface import surface_mesh
@@ -61,7 +57,9 @@ class Superellipsoid(Shape):
         """See `Shape.check_form`."""
         del dimension
         if form.shape[1] != 1:
-            msg = f"form has {form.shape[1]} columns, expected one for a {self.name}, the exponent p"
+            msg = (
+                f"form has {form.shape[1]} columns, expected one for a {self.name}, the exponent p"
+            )
             raise ValueError(msg)
         if not (form > 0.5).all():
             msg = f"exponents hold {form.min()}, expected p > 0.5, for which bodies are convex"

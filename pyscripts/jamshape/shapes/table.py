@@ -83,11 +83,7 @@ def guess_shape_style(diameters: FloatArray, *, has_exponent: bool = False) -> s
         If no shape fits.
     """
     for name, shape in SHAPES.items():
-        if (
-            shape.fits(diameters)
-            and shape.has_exponent >= has_exponent
-            and not shape.has_form
-        ):
+        if shape.fits(diameters) and shape.has_exponent >= has_exponent and not shape.has_form:
             return name
     msg = f"diameters such as {diameters[0].tolist()} fit no shape, expected positive lengths"
     raise ValueError(msg)
