@@ -3,6 +3,7 @@
 #include "contact/clump/form.hpp"
 #include "contact/extended.hpp"
 #include "contact/spherocylinder/spherocylinder.hpp"
+#include "contact/spheropolygon/form.hpp"
 #include "contact/superellipsoid/superellipsoid.hpp"
 
 #include "bindings/arrays.hpp"
@@ -330,14 +331,30 @@ std::vector<Ball> discs_in(const Array2<double> &rows, int dimension)
   return *discs;
 }
 
-nb::object union_moments(const Array2<double> &rows, int dimension)
+nb::object as_array(const Moments &found)
 {
-  const Moments found = moments_of(discs_in(rows, dimension), dimension);
   NewArray<double> values({10});
   values[0] = found.measure;
   for (int k = 0; k < 3; ++k) values[1 + k] = found.first[k];
   for (int k = 0; k < 6; ++k) values[4 + k] = found.second[k];
   return values.release();
+}
+
+nb::object union_moments(const Array2<double> &rows, int dimension)
+{
+  return as_array(moments_of(discs_in(rows, dimension), dimension));
+}
+
+nb::object polygon_moments(double rounding, const Array2<double> &corners)
+{
+  require(corners.shape(1) == 2, "corners do not have the shape (n, 2).");
+  FormNumbers numbers{rounding};
+  numbers.insert(numbers.end(), corners.data(), corners.data() + corners.size());
+  const auto polygon = read_polygon(numbers);
+  require(polygon.has_value(), "corners are no convex polygon, expected 1 to " +
+                                   std::to_string(MOST_CORNERS) +
+                                   " corners, counter-clockwise, and a positive rounding radius.");
+  return as_array(polygon->moments());
 }
 
 nb::object boundary_arcs(const Array2<double> &rows)
@@ -394,6 +411,8 @@ void export_probes(nb::module_ &m)
         "Integrals over a union of discs (n, 4), x y z r of each, balls in 3D: of 1, x, y, z, xx, "
         "yy,\n"
         "zz, xy, xz, yz (10,).");
+  m.def("polygon_moments", &polygon_moments, "rounding"_a, "corners"_a,
+        "The same of a rounded polygon with corners (n, 2), counter-clockwise.");
   m.def(
       "boundary_arcs", &boundary_arcs, "discs"_a,
       "Arcs of the boundary of a union of discs (n, 4) in the plane (M, 3): index of the disc and\n"

@@ -3,6 +3,7 @@
 #include "contact/clump/clump.hpp"
 #include "contact/dimer/dimer.hpp"
 #include "contact/spherocylinder/spherocylinder.hpp"
+#include "contact/spheropolygon/spheropolygon.hpp"
 #include "contact/superellipsoid/superellipsoid.hpp"
 
 namespace jamshape {
@@ -13,6 +14,7 @@ template <class... Models> struct ShapeList {
 };
 
 /// All shapes available in Python and the command `create_random`.
-using Shapes = ShapeList<SpherocylinderModel, SuperellipsoidModel, DimerModel, ClumpModel>;
+using Shapes =
+    ShapeList<SpherocylinderModel, SuperellipsoidModel, DimerModel, ClumpModel, SpheropolygonModel>;
 
 }  // namespace jamshape

@@ -34,6 +34,7 @@ from .packing import Box as Box
 from .shapes.named import Clumps as Clumps
 from .shapes.named import Dimers as Dimers
 from .shapes.named import Spherocylinders as Spherocylinders
+from .shapes.named import Spheropolygons as Spheropolygons
 from .shapes.named import Superellipsoids as Superellipsoids
 from .shapes.particles import Kind as Kind
 from .shapes.particles import Particles as Particles

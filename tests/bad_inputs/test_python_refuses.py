@@ -96,7 +96,9 @@ def cases():
             yield f"range of {name}: {value}", partial(require_stated, **{name: value})
     for shape in SHAPES.values():
         for p in shape.parameters:
-            for value in (p.allowed.low - 1, p.allowed.high * 2 + 1, NAN):
+            for value in (
+                (p.allowed.low - 1, p.allowed.high * 2 + 1, NAN) if p.allowed else ("1 x",)
+            ):
                 what = f"range of {p.name} of {shape.name}s: {value}"
                 yield what, partial(Particles.of, shape, **{p.name: value})
     yield from {
@@ -253,5 +255,5 @@ def test_what_is_in_range_is_not_refused():
         require_stated(**{name: number(allowed.low)})
     for shape in SHAPES.values():
         for p in shape.parameters:
-            for value in (p.allowed.low, p.allowed.high, *p.allowed.also):
+            for value in (p.allowed.low, p.allowed.high, *p.allowed.also) if p.allowed else ():
                 Particles.of(shape, **{p.name: value})

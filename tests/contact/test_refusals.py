@@ -16,6 +16,7 @@ SHAPES = {
     _contact.Spherocylinders: ((4.0, 2.0, 2.0), ()),
     _contact.Superellipsoids: ((4.0, 2.0, 3.0), (1.0,)),
     _contact.Dimers: ((4.0, 2.0, 2.0), ()),
+    _contact.Spheropolygons: ((4.0, 2.0, 1.0), (0.5, -1.5, -0.5, 1.5, -0.5, 1.5, 0.5, -1.5, 0.5)),
     _contact.Clumps: ((4.0, 2.0, 2.0), (-1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0)),
 }
 every_shape = pytest.mark.parametrize("shape", list(SHAPES), ids=lambda x: x.__name__)

@@ -200,6 +200,14 @@ def test_particles_may_turn_about_their_axes_of_symmetry(packing):
 # --- what holds a particle -----------------------------------------------------------------------
 
 
+def are_in_touch(packing):
+    """Whether any two particles are, or are so close that no force is defined."""
+    try:
+        return len(find_contacts(packing, sides=SIDES).pairs) > 0
+    except CrossingError:
+        return True
+
+
 @pytest.mark.parametrize("case", PURE, ids=str)
 def test_two_particles_that_barely_touch_hold_neither(case):
     packing = scattered(case, 2, phi=0.01)
@@ -209,8 +217,7 @@ def test_two_particles_that_barely_touch_hold_neither(case):
         middle = 0.5 * (far + near)
         position = np.array([packing.position[1] + middle * towards, packing.position[1]])
         closer = packing.with_(position=position)
-        touching = len(find_contacts(closer, sides=SIDES).pairs) > 0
-        far, near = (far, middle) if touching else (middle, near)
+        far, near = (far, middle) if are_in_touch(closer) else (middle, near)
     position[0] = packing.position[1] + (near - 1e-6) * towards
     closer = packing.with_(position=position)
     network = find_contacts(closer, sides=SIDES)

@@ -2,6 +2,7 @@
 
 #include "contact/clump/union.hpp"
 #include "contact/contact.hpp"
+#include "contact/math/region.hpp"
 #include "contact/math/vec.hpp"
 
 #include <algorithm>
@@ -27,8 +28,7 @@ struct Discs {
 
   Discs(int D, std::vector<Ball> of, const Moments &by) : dimension(D), ball(std::move(of))
   {
-    const double xx = by.second[0], yy = by.second[1], zz = by.second[2], all = by.measure;
-    drag = {all, {{(yy + zz) / all, (xx + zz) / all, (xx + yy) / all}}};
+    drag = drag_of(by);
     smallest = ball[0].radius;
     half_extents = {};
     for (const Ball &one : ball) {
@@ -42,18 +42,6 @@ struct Discs {
     }
   }
 };
-
-/// Whether a body's integrals are those about its centre and along its principal axes.
-inline bool are_principal(const Moments &of, int dimension)
-{
-  // More than the error of the integrals over balls.
-  constexpr double ROUNDING = 1e-7;
-  const double size = std::sqrt((of.second[0] + of.second[1] + of.second[2]) / of.measure);
-  double off = 0.0;
-  for (int k = 0; k < dimension; ++k) off = std::max(off, std::abs(of.first[k]) / size);
-  for (int k = 3; k < 6; ++k) off = std::max(off, std::abs(of.second[k]) / (size * size));
-  return off <= ROUNDING * of.measure;
-}
 
 /// Discs per body that a search may take.
 inline constexpr std::size_t MOST_DISCS = 255;
@@ -95,7 +83,7 @@ struct ClumpForm {
     const auto discs = read_discs(numbers, dimension);
     if (!discs) return std::nullopt;
     const Moments found = moments_of(*discs, dimension);
-    if (!are_principal(found, dimension)) return std::nullopt;
+    if (!are_principal(found)) return std::nullopt;
     return ClumpForm{std::make_shared<const Discs>(dimension, *discs, found)};
   }
 };

@@ -1,9 +1,9 @@
 #pragma once
 
+#include "contact/math/region.hpp"
 #include "contact/math/vec.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -16,42 +16,7 @@ struct Ball {
   double radius;
 };
 
-/// Integrals over a region: of 1, of x_k, and of x_k x_l (xx, yy, zz, xy, xz, yz).
-struct Moments {
-  double measure = 0.0;
-  Vec<3> first{};
-  std::array<double, 6> second{};
-
-  void add(double weight, const Moments &other)
-  {
-    measure += weight * other.measure;
-    for (int k = 0; k < 3; ++k) first[k] += weight * other.first[k];
-    for (int k = 0; k < 6; ++k) second[k] += weight * other.second[k];
-  }
-};
-
 namespace detail {
-
-/// Nodes and weights of Gauss and Legendre on [-1, 1], by Newton's method on the polynomial.
-inline std::vector<std::pair<double, double>> gauss_legendre(int n)
-{
-  std::vector<std::pair<double, double>> rule;
-  for (int k = 0; k < n; ++k) {
-    double x = std::cos(M_PI * (k + 0.75) / (n + 0.5)), slope = 1.0;
-    for (int step = 0; step < 100; ++step) {
-      double before = 1.0, p = x;
-      for (int m = 2; m <= n; ++m) {
-        before = std::exchange(p, ((2 * m - 1) * x * p - (m - 1) * before) / m);
-      }
-      slope = n * (x * p - before) / (x * x - 1.0);
-      const double change = p / slope;
-      x -= change;
-      if (std::abs(change) < 1e-15) break;
-    }
-    rule.emplace_back(x, 2.0 / ((1.0 - x * x) * slope * slope));
-  }
-  return rule;
-}
 
 /// The parts of circle k that no other disc covers, as intervals of angles.
 inline std::vector<std::pair<double, double>> free_arcs(const std::vector<Ball> &discs,
@@ -89,28 +54,14 @@ inline std::vector<std::pair<double, double>> free_arcs(const std::vector<Ball> 
 
 }  // namespace detail
 
-/// Area and moments of a union of discs, by Green's theorem on the arcs of its boundary; Gauss and
-/// Legendre's rule is exact to rounding on the trigonometric polynomials there.
+/// Area and moments of a union of discs, by the arcs of its boundary.
 inline Moments union_of_discs(const std::vector<Ball> &discs)
 {
-  static const auto RULE = detail::gauss_legendre(16);
   Moments sum;
   for (std::size_t k = 0; k < discs.size(); ++k) {
-    const double a = discs[k].centre[0], b = discs[k].centre[1], R = discs[k].radius;
+    const Ball &disc = discs[k];
     for (const auto &[from, to] : detail::free_arcs(discs, k)) {
-      const int parts = 1 + static_cast<int>((to - from) / M_PI * 2.0);
-      const double half = 0.5 * (to - from) / parts;
-      for (int part = 0; part < parts; ++part) {
-        for (const auto &[node, weight] : RULE) {
-          const double angle = from + half * (2 * part + 1 + node);
-          const double c = std::cos(angle), s = std::sin(angle);
-          const double x = a + R * c, y = b + R * s, dx = -R * s, dy = R * c, w = half * weight;
-          sum.add(w, {0.5 * (x * dy - y * dx),
-                      {{0.5 * x * x * dy, -0.5 * y * y * dx, 0.0}},
-                      {x * x * x * dy / 3.0, -y * y * y * dx / 3.0, 0.0, 0.5 * x * x * y * dy, 0.0,
-                       0.0}});
-        }
-      }
+      add_arc(sum, disc.centre[0], disc.centre[1], disc.radius, from, to);
     }
   }
   return sum;

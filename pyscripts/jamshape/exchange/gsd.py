@@ -31,7 +31,7 @@ from jamshape.files.vocabulary import FORMAT_VERSION, require_format
 from jamshape.packing import Packing
 from jamshape.shapes.mesh import SurfaceMesh
 from jamshape.shapes.shape import Interaction
-from jamshape.shapes.solid import Balls, Solid, Superquadric
+from jamshape.shapes.solid import Balls, RoundedPolygon, Solid, Superquadric
 from jamshape.shapes.table import shape_named
 
 LOG = "jamshape/"
@@ -225,6 +225,12 @@ def _(solid: Balls) -> dict[str, Any]:
     centers = solid.centers.tolist()
     diameters = (2 * solid.radii).tolist()
     return {"type": "SphereUnion", "diameters": diameters, "centers": centers}
+
+
+@_described.register
+def _(solid: RoundedPolygon) -> dict[str, Any]:
+    vertices = solid.corners.tolist()
+    return {"type": "Polygon", "rounding_radius": solid.radius, "vertices": vertices}
 
 
 def _mesh(surface: SurfaceMesh) -> dict[str, Any]:

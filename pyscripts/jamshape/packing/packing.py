@@ -73,7 +73,7 @@ class Packing(Record):
     else:
         exponent: InitVar[FloatArray | None] = None
 
-    def __post_init__(self, exponent: FloatArray | None) -> None:
+    def __post_init__(self, exponent: FloatArray | None) -> None:  # type: ignore[override]
         n = len(np.atleast_1d(real_numbers("position", self.position)))
         dimension = self.box.dimension
         if n == 0:

@@ -8,22 +8,18 @@ from __future__ import annotations
 import hashlib
 import importlib
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from jamshape.arrays import FloatArray
 from jamshape.shapes.level_set import level_set_mesh
 from jamshape.shapes.mesh import SurfaceMesh, arc
+from jamshape.shapes.principal import Moments, is_principal, principal, rows_of, text_of
 from jamshape.shapes.shape import MOST_NUMBERS, Parameter, Shape
 from jamshape.shapes.solid import Balls
 
 _WIDTH = 4  # numbers of a disc: x y z r
-_PRINCIPAL = 1e-9  # relative; off the centre or the principal axes by less is rounding
-
-_WITHIN = "x y r of each disc, or x y z r, with positive radii and at most 255 of them"
 
 
 class Discs(Parameter):
@@ -32,99 +28,43 @@ class Discs(Parameter):
     __slots__ = ()
 
     def read(self, value: Any) -> str:
-        """Return discs, from rows, text or the name of a file of rows, about their centre of area, along principal axes.
+        """Return discs about their centre of area, or balls about that of volume, along principal axes.
+
+        Rows x y r are discs in the plane; rows x y z r are balls, unless they lie as discs already.
 
         Raises
         ------
         ValueError
             If they are no discs.
         """
-        return _text(principal(_rows(value)))
+        rows = _rows(value)
+        if rows.shape[1] == _WIDTH:
+            placed = _place(rows[:, :3], rows[:, 3])
+        else:
+            placed = principal(np.insert(rows[:, :2], 2, 0.0, axis=1), _moments(rows[:, 2], 2))
+        return text_of(np.column_stack([placed, rows[:, -1]]))
 
 
-def principal(discs: ArrayLike) -> FloatArray:
-    """Move discs (n, 3) x y r to their centre of area, and balls (n, 4) x y z r to that of volume, and to principal axes.
-
-    Returns
-    -------
-    (n, 4) array of float64
-        Unchanged where they are there; else rotated by as little as possible.
-    """
-    rows = np.array(discs, np.float64)
-    if rows.shape[1] == _WIDTH:
-        is_flat = not rows[:, 2].any() and _off(rows, 2) is None
-        return rows if is_flat else _moved(rows, 3)
-    return _moved(np.insert(rows, 2, 0.0, axis=1), 2)
+def _place(centres: FloatArray, radii: FloatArray) -> FloatArray:
+    is_flat = not centres[:, 2].any() and is_principal(centres, _moments(radii, 2))
+    return centres if is_flat else principal(centres, _moments(radii, 3))
 
 
-def _moved(rows: FloatArray, dimension: int) -> FloatArray:
-    for _ in range(3):  # the second time corrects rounding
-        off = _off(rows, dimension)
-        if off is None:
-            break
-        centre, square = off
-        rows = np.column_stack(
-            [(rows[:, :3] - centre) @ _nearest_axes(square, dimension), rows[:, 3]]
-        )
-    return rows
-
-
-def _off(rows: FloatArray, dimension: int) -> tuple[FloatArray, FloatArray] | None:
-    """Return the centre and the second moments about it, (3, 3), over the area (volume); None if they are principal."""
+def _moments(radii: FloatArray, dimension: int) -> Moments:
     contact = importlib.import_module("jamshape._contact")
-    measure, x, y, z, xx, yy, zz, xy, xz, yz = contact.union_moments(rows, dimension)
-    centre = np.array([x, y, z]) / measure
-    square = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) / measure
-    square -= np.outer(centre, centre)
-    size = np.sqrt(np.trace(square))
-    is_centred = (np.abs(centre) <= _PRINCIPAL * size).all()
-    off = np.abs(square - np.diag(np.diag(square))).max()
-    return None if is_centred and off <= _PRINCIPAL * size**2 else (centre, square)
-
-
-def _nearest_axes(square: FloatArray, dimension: int) -> FloatArray:
-    """Return the eigenvectors of a (3, 3) matrix, as columns, each near the axis that it replaces."""
-    found = np.eye(3)
-    _, vectors = np.linalg.eigh(square[:dimension, :dimension])
-    for k in range(dimension):
-        nearest = int(np.abs(vectors[k]).argmax())
-        found[:dimension, k] = vectors[:, nearest] * np.sign(vectors[k, nearest])
-        vectors[:, nearest] = 0.0
-    if np.linalg.det(found) < 0:
-        found[:, dimension - 1] *= -1
-    return found
+    return lambda centres: np.asarray(
+        contact.union_moments(np.column_stack([centres, radii]), dimension)
+    )
 
 
 def _rows(value: Any) -> FloatArray:
-    """Return rows of discs from rows, text or a file, or raise a ValueError."""
-    if isinstance(value, str):
-        path = Path(value)
-        is_file = ("/" not in value.strip("/") and path.is_file()) or (
-            path.suffix and path.is_file()
-        )
-        try:
-            lines = path.read_text().splitlines() if is_file else value.split("/")
-            plain = [line.partition("#")[0].split() for line in lines]
-            value = [[float(word) for word in row] for row in plain if row]
-        except (OSError, ValueError, UnicodeDecodeError):
-            msg = f"discs are {value!r}, expected {_WITHIN}, as rows, as text such as '0 0 1/1 0 0.5', or the name of a file"
-            raise ValueError(msg) from None
-    try:
-        rows = np.array(value, np.float64)
-    except (TypeError, ValueError):
-        rows = np.empty(0)
-    is_right = rows.ndim == 2 and rows.shape[1] in {_WIDTH - 1, _WIDTH}
-    is_right = (
-        is_right and 0 < len(rows) <= MOST_NUMBERS // _WIDTH and bool(np.isfinite(rows).all())
-    )
-    if not (is_right and (rows[:, -1] > 0).all()):
-        msg = f"discs have shape {rows.shape}, expected {_WITHIN}"
+    """Return rows of discs, or raise a ValueError."""
+    expected = "x y r of each disc, or x y z r, with positive radii and at most 255 of them"
+    rows = rows_of("discs", value, (_WIDTH - 1, _WIDTH), expected)
+    if not (rows[:, -1] > 0).all() or len(rows) >= MOST_NUMBERS // _WIDTH:
+        msg = f"discs has {len(rows)} rows with radii from {rows[:, -1].min():g} on, expected {expected}"
         raise ValueError(msg)
     return rows
-
-
-def _text(rows: FloatArray) -> str:
-    return "/".join(" ".join(map(repr, row)) for row in (rows + 0.0).tolist())
 
 
 def _discs(form: FloatArray) -> FloatArray:
@@ -140,7 +80,7 @@ def _half_extents(rows: FloatArray) -> FloatArray:
 
 
 # Three touching discs of diameter 1.
-_TRIMER = _text(np.array([[2, 0, 0, 0], [-1, 3**0.5, 0, 0], [-1, -(3**0.5), 0, 0]]) / 12**0.5 + [0, 0, 0, 0.5])  # fmt: skip
+_TRIMER = text_of(np.array([[2, 0, 0, 0], [-1, 3**0.5, 0, 0], [-1, -(3**0.5), 0, 0]]) / 12**0.5 + [0, 0, 0, 0.5])  # fmt: skip
 
 
 class Clump(Shape):
@@ -159,8 +99,8 @@ class Clump(Shape):
     has_form = True
     examples = (
         {"discs": _TRIMER},
-        {"discs": _text(np.array([[-0.35, 0, 0, 0.5], [0.35, 0, 0, 0.5]]))},
-        {"discs": _text(np.array([[x, y, 0, 0.45] for x in (-0.4, 0.4) for y in (-0.3, 0.3)]))},
+        {"discs": text_of(np.array([[-0.35, 0, 0, 0.5], [0.35, 0, 0, 0.5]]))},
+        {"discs": text_of(np.array([[x, y, 0, 0.45] for x in (-0.4, 0.4) for y in (-0.3, 0.3)]))},
     )
 
     def form_of_exponents(self, exponent: FloatArray) -> FloatArray:
@@ -199,7 +139,7 @@ class Clump(Shape):
     ) -> tuple[dict[str, Any], float]:
         """See `Shape.parameters_of`."""
         rows = _discs(form)
-        return {"discs": _text(rows)}, float(diameters[0] / (2 * _half_extents(rows)[0]))
+        return {"discs": text_of(rows)}, float(diameters[0] / (2 * _half_extents(rows)[0]))
 
     def outline(self, diameters: FloatArray, form: FloatArray, points: int = 64) -> FloatArray:
         """See `Shape.outline`: closed curves of arcs, joined by a line there and back where there are several."""

@@ -26,3 +26,9 @@ def Clumps(
     size_ratio: float | None = None,
     **kinds: ArrayLike,
 ) -> Particles: ...
+def Spheropolygons(
+    corners: ArrayLike = ...,
+    rounding: ArrayLike = 0.1,
+    size_ratio: float | None = None,
+    **kinds: ArrayLike,
+) -> Particles: ...

@@ -206,6 +206,8 @@ class Shape(ABC):
     """Length that equals 1 for a particle of size 1."""
     examples: ClassVar[tuple[Mapping[str, Any], ...]]
     """Parameters for tests, most typical first; together they take all code paths of its contacts."""
+    dimensions: ClassVar[tuple[int, ...]] = (2, 3)
+    """Dimensions that it exists in."""
     dimension: ClassVar[int] = 2
     """Default dimension of packings."""
     size_ratio: ClassVar[float] = 1.0

@@ -42,4 +42,13 @@ class Balls:
     """(K,)"""
 
 
-Solid = RoundedSegment | Superquadric | Balls
+@dataclass(frozen=True, eq=False)
+class RoundedPolygon:
+    """All points in the plane within a radius of a convex polygon."""
+
+    corners: FloatArray
+    """(K, 2), counter-clockwise."""
+    radius: float
+
+
+Solid = RoundedSegment | Superquadric | Balls | RoundedPolygon

@@ -9,6 +9,7 @@ from jamshape.shapes.clump import Clump
 from jamshape.shapes.dimer import Dimer
 from jamshape.shapes.shape import Shape
 from jamshape.shapes.spherocylinder import Spherocylinder
+from jamshape.shapes.spheropolygon import Spheropolygon
 from jamshape.shapes.superellipsoid import Superellipsoid
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ SHAPES: dict[str, Shape] = {
         Superellipsoid(),
         Dimer(),
         Clump(),
+        Spheropolygon(),
     )
 }
 """Shapes by name; the first is the default."""

@@ -1,0 +1,7 @@
+#include "contact/spheropolygon/spheropolygon.hpp"
+
+namespace jamshape {
+
+JAMSHAPE_CONTACTS(, SpheropolygonModel)
+
+}  // namespace jamshape

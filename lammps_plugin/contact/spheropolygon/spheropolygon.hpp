@@ -1,0 +1,310 @@
+#pragma once
+
+#include "contact/compiled_once.hpp"
+#include "contact/contact.hpp"
+#include "contact/math/rotation.hpp"
+#include "contact/math/vec.hpp"
+#include "contact/spherocylinder/spherocylinder.hpp"
+#include "contact/spheropolygon/form.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <type_traits>
+
+namespace jamshape {
+
+/// A rounded polygon: its form, and the factor of its size.
+struct Spheropolygon {
+  std::shared_ptr<const RoundedPolygon> polygon;
+  double scale;
+};
+
+/// A rounded polygon in a pose; it lives in the plane, and has no body in space.
+template <int D, class S = double> struct SpheropolygonBody {
+  Vec<D, S> centre;
+  Vec<D, S> axis;
+  double scale;
+  const RoundedPolygon *polygon;
+
+  double radius() const { return scale * polygon->rounding; }
+  double core_radius() const { return scale * polygon->farthest; }
+  int n() const { return static_cast<int>(polygon->side.size()); }
+
+  /// A vector in the body's coordinates, in space.
+  Vec<D, S> turned(const Vec<2> &v) const
+  {
+    Vec<D, S> there{};
+    there[0] = v[0] * axis[0] - v[1] * axis[1];
+    there[1] = v[0] * axis[1] + v[1] * axis[0];
+    return there;
+  }
+  Vec<D, S> middle(int side) const { return turned(scale * polygon->side[side].middle); }
+  Vec<D, S> along(int side) const { return turned(polygon->side[side].along); }
+  double half_length(int side) const { return scale * polygon->side[side].half_length; }
+};
+
+template <int D, class S>
+SpheropolygonBody<D, ValueOf<S>> values_of(const SpheropolygonBody<D, S> &body)
+{
+  return {values_of(body.centre), values_of(body.axis), body.scale, body.polygon};
+}
+
+/// The spines of two sides.
+template <int D, class S>
+SpinePair<D, S> sides_of(const SpheropolygonBody<D, S> &i, int a, const SpheropolygonBody<D, S> &j,
+                         int b)
+{
+  return {i.centre - j.centre + i.middle(a) - j.middle(b), i.along(a), i.half_length(a), j.along(b),
+          j.half_length(b)};
+}
+
+/// The sides of one body that come closer to the other core's bounding circle than `reach`.
+template <int D, class T> struct FacingSides {
+  int n = 0;
+  std::array<int, MOST_CORNERS> which;
+
+  FacingSides(const SpheropolygonBody<D, T> &of, const SpheropolygonBody<D, T> &other, T reach)
+  {
+    reach += other.core_radius();
+    for (int k = 0; k < of.n(); ++k) {
+      const Vec<D, T> away = other.centre - of.centre - of.middle(k), along = of.along(k);
+      const T foot = limited(dot(away, along), of.half_length(k));
+      if (norm_sq(away - foot * along) < reach * reach) which[n++] = k;
+    }
+  }
+};
+
+/// Whether the centre of one body lies in the core of the other.
+template <int D, class T>
+bool holds_centre(const SpheropolygonBody<D, T> &of, const SpheropolygonBody<D, T> &other)
+{
+  const Vec<D, T> at = other.centre - of.centre;
+  for (int k = 0; k < of.n(); ++k) {
+    const Vec<D, T> along = of.along(k), from = at - of.middle(k);
+    if (!(along[0] * from[1] - along[1] * from[0] > 0.0)) return false;
+  }
+  return of.n() > 1;
+}
+
+/// Calls `visit` with each two sides that face each other and are closer than `reach`, and their
+/// spines, until it returns false. Returns false if cores overlap.
+template <int D, class T, class Visit>
+bool each_two_sides(const SpheropolygonBody<D, T> &i, const SpheropolygonBody<D, T> &j, T reach,
+                    const Visit &visit)
+{
+  const T bounding = i.core_radius() + j.core_radius() + reach;
+  if (!(norm_sq(i.centre - j.centre) < bounding * bounding)) return true;
+  if (holds_centre(i, j) || holds_centre(j, i)) return false;
+  const FacingSides<D, T> of_i(i, j, reach);
+  if (of_i.n == 0) return true;
+  const FacingSides<D, T> of_j(j, i, reach);
+  for (int m = 0; m < of_i.n; ++m) {
+    for (int n = 0; n < of_j.n; ++n) {
+      const int a = of_i.which[m], b = of_j.which[n];
+      const SpinePair<D, T> spines = sides_of(i, a, j, b);
+      const T near = reach + spines.A_i + spines.A_j;
+      if (!(norm_sq(spines.r) < near * near)) continue;
+      if (spines_cross(spines)) return false;
+      if (!visit(a, b, spines)) return true;
+    }
+  }
+  return true;
+}
+
+/// Contact of two rounded polygons: that of the two of their sides with the largest energy, each
+/// two by the law of rods (SpherocylinderContact), so that polygons of two corners are rods. Sides
+/// that share a corner have the same energy there, of the corner's distance; flat contacts have two
+/// bonds. Overlapping cores have no law.
+template <int D, class S>
+Contact<D, S, 2> contact_of(const SpheropolygonBody<D, S> &i, const SpheropolygonBody<D, S> &j,
+                            const SpherocylinderLaw &law)
+{
+  using T = ValueOf<S>;
+  struct Best {
+    int a = -1, b = -1;
+    T energy{-1.0};
+  } best;
+  bool is_crossing = false;
+  const double reach = i.radius() + j.radius();
+  const bool is_clear = each_two_sides<D, T>(
+      values_of(i), values_of(j), reach, [&](int a, int b, const SpinePair<D, T> &spines) {
+        const Contact<D, T, 2> found =
+            SpherocylinderContact<D, T>(spines, i.radius(), j.radius(), law).evaluate();
+        is_crossing = is_crossing || found.status == ContactStatus::CROSSING;
+        if (found.status == ContactStatus::TOUCHING && found.energy > best.energy)
+          best = {a, b, found.energy};
+        return !is_crossing;
+      });
+  if (is_crossing || !is_clear) return without_bonds<D, S, 2>(ContactStatus::CROSSING);
+  if (best.a < 0) return without_bonds<D, S, 2>(ContactStatus::APART);
+  Contact<D, S, 2> contact =
+      SpherocylinderContact<D, S>(sides_of(i, best.a, j, best.b), i.radius(), j.radius(), law)
+          .evaluate();
+  // From the middles of the sides to the centres of the bodies.
+  const Vec<D, S> to_i = i.middle(best.a), to_j = j.middle(best.b);
+  contact.torque_i += cross(to_i, contact.force);
+  contact.torque_j -= cross(to_j, contact.force);
+  for (int b = 0; b < contact.n_bonds; ++b) {
+    Bond<D, S> &bond = contact.bond[b];
+    bond.arm_i += to_i;
+    bond.lever_i += cross(to_i, bond.normal);
+    bond.lever_j -= cross(to_j, bond.normal);
+  }
+  return contact;
+}
+
+/// Interface of a shape (see SpherocylinderModel).
+struct SpheropolygonModel {
+  using Shape = Spheropolygon;
+  using Law = SpherocylinderLaw;
+  using Form = SpheropolygonForm;
+  template <int D, class S = double> using Body = SpheropolygonBody<D, S>;
+  template <int D> using Start = NoStart;
+
+  static constexpr const char *NAME = "spheropolygon";
+  static constexpr const char *SHAPE_RULE =
+      "a spheropolygon, in the plane, has the diameters of the box around it, in their proportions";
+  static constexpr const char *FORM = "polygon";
+  static constexpr const char *FORM_RULE =
+      "a rounding radius and x y of up to 255 corners, convex and counter-clockwise, the centre of "
+      "area of the body at 0 and its principal axes along x and y, as js.Spheropolygons writes "
+      "them, in dimension 2";
+  static constexpr const char *CORE = "cores";
+  static constexpr int MOST_BONDS = 2;
+  static constexpr bool HAS_SIDES = true;
+  static constexpr bool BONDS_ARE_CONTACTS = false;
+  static constexpr int OVERLAP_POWER = 1;
+
+  static Law law(double k_e, Sides sides, bool shortcuts = true)
+  {
+    return {{k_e}, sides, shortcuts};
+  }
+
+  /// Relative difference of extents that rounding leaves.
+  static constexpr double ROUNDING = 1e-9;
+
+  static std::optional<Shape> shape_from(const Vec<3> &semi_axes, const Form &form)
+  {
+    const auto &polygon = form.polygon ? form.polygon : disc();
+    const double scale = semi_axes[0] / polygon->half_extents[0];
+    if (!(scale > 0.0) || !std::isfinite(scale)) return std::nullopt;
+    for (int k = 1; k < 3; ++k) {
+      const double expected = scale * polygon->half_extents[k];
+      if (!(std::abs(semi_axes[k] - expected) <= ROUNDING * expected)) return std::nullopt;
+    }
+    return Shape{polygon, scale};
+  }
+
+  template <int D> static Shortcut shortcut(const Shape &shape)
+  {
+    return turns<D>(shape) ? Shortcut::NONE : Shortcut::ROUND;
+  }
+  template <int D> static bool turns(const Shape &shape) { return shape.polygon->farthest > 0.0; }
+
+  template <int D> static SubstrateDrag drag(const Shape &shape)
+  {
+    const double area = shape.scale * shape.scale;
+    const SubstrateDrag &of_form = shape.polygon->drag;
+    return {area * of_form.measure, area * of_form.moment};
+  }
+
+  template <int D> static double outer_radius(const Shape &shape)
+  {
+    return shape.scale * (shape.polygon->farthest + shape.polygon->rounding);
+  }
+  template <int D> static double inner_radius(const Shape &shape)
+  {
+    return 0.5 * shape.scale * shape.polygon->width;
+  }
+  template <int D> static double rotation_length(const Shape &shape)
+  {
+    return shape.scale * shape.polygon->farthest;
+  }
+  template <int D> static double turning_radius(const Shape &shape)
+  {
+    return rotation_length<D>(shape);
+  }
+
+  /// The long axis of a rod; no other body in the plane has one.
+  static std::optional<int> symmetry_axis(const Shape &shape)
+  {
+    return shape.polygon->corner.size() == 2 ? director<2>(shape) : std::nullopt;
+  }
+
+  /// The body axis about which area lies closest, if there is one.
+  template <int D> static std::optional<int> director(const Shape &shape)
+  {
+    constexpr double ISOTROPIC = 1e-6;  // relative difference of moments that rounding leaves
+    const Vec<3> &moment = shape.polygon->drag.moment;
+    const int least = moment[0] < moment[1] ? 0 : 1;
+    const bool is_long = moment[least] < (1.0 - ISOTROPIC) * moment[1 - least];
+    return is_long ? std::optional<int>(least) : std::nullopt;
+  }
+
+  template <int D, class S = double> static Body<D, S> body(const Shape &shape)
+  {
+    Vec<D, S> along_x{};
+    along_x[0] = 1.0;
+    return {{}, along_x, shape.scale, shape.polygon.get()};
+  }
+
+  template <int D, class S> static void turn_to(Body<D, S> &body, const QuaternionOf<S> &q)
+  {
+    body.axis = long_axis<D, S>(q);
+  }
+
+  /// Whether a bond lies on a straight side, over which a particle cannot roll.
+  template <int D, class S>
+  static OnFaces on_faces(const Contact<D, S, MOST_BONDS> &contact, int b, const Body<D, S> &,
+                          const Body<D, S> &)
+  {
+    const bool is_between = contact.kind == ContactKind::SIDE_TO_SIDE;
+    return {is_between || contact.bond[b].on_side_i, is_between || contact.bond[b].on_side_j};
+  }
+
+  /// Whether the gap between the surfaces of i and j is smaller than `margin`.
+  template <int D> static bool closer_than(double margin, const Body<D> &i, const Body<D> &j)
+  {
+    const double reach = i.radius() + j.radius() + margin;
+    bool is_closer = false;
+    const bool is_clear =
+        each_two_sides<D, double>(i, j, reach, [&](int, int, const SpinePair<D> &spines) {
+          is_closer = spine_distance_sq(spines) < reach * reach;
+          return !is_closer;
+        });
+    return is_closer || !is_clear;
+  }
+
+  template <int D> struct Pose {
+    Vec<D> centre, axis;
+  };
+  template <int D> static Pose<D> pose(const Body<D> &body) { return {body.centre, body.axis}; }
+
+  /// Upper bound of the squared displacement of any point of the core: |dx| + |x| |du|.
+  template <int D>
+  static double motion_sq(const Vec<D> &shift, const Body<D> &now, const Pose<D> &then)
+  {
+    const double moved = norm(shift) + now.core_radius() * norm(now.axis - then.axis);
+    return moved * moved;
+  }
+
+ private:
+  static const std::shared_ptr<const RoundedPolygon> &disc()
+  {
+    static const auto one = std::make_shared<const RoundedPolygon>(1.0, std::vector<Vec<2>>{{}});
+    return one;
+  }
+};
+
+/// Whether two bodies share more than a point: for Monte Carlo of hard particles.
+template <int D> bool are_overlapping(const SpheropolygonBody<D> &i, const SpheropolygonBody<D> &j)
+{
+  return SpheropolygonModel::closer_than<D>(0.0, i, j);
+}
+
+JAMSHAPE_CONTACTS(extern, SpheropolygonModel)
+
+}  // namespace jamshape

@@ -1,0 +1,24 @@
+#include "contact/spheropolygon/spheropolygon.hpp"
+
+#include "pair_with_sides.h"
+
+#include <string>
+
+namespace jamshape {
+
+namespace {
+
+/// pair_style spheropolygon/harmonic sides one|two; pair_coeff I J k_e [polygon]
+class PairSpheropolygonHarmonic : public PairWithSides<SpheropolygonModel> {
+ public:
+  using PairWithSides::PairWithSides;
+
+ protected:
+  std::string without_force() const override { return "overlapping cores"; }
+};
+
+const PairStyle<PairSpheropolygonHarmonic> listed;
+
+}  // namespace
+
+}  // namespace jamshape
