@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -78,14 +79,13 @@ template <class Model> class ShapeOf {
     require(diameters.shape(1) == 3 && form.shape(0) == diameters.shape(0),
             "diameters and form do not have shapes (N, 3) and (N, K).");
     particles.reserve(diameters.shape(0));
-    FormNumbers last;
-    std::optional<typename Model::Form> its = Model::Form::from(last, dimension);
+    // Particles of several forms come in any order, and moments of balls take milliseconds.
+    std::map<FormNumbers, std::optional<typename Model::Form>> forms;
     for (std::size_t i = 0; i < diameters.shape(0); ++i) {
       const double *const row = form.data() + form.shape(1) * i;
-      if (!std::equal(last.begin(), last.end(), row, row + form.shape(1))) {
-        last.assign(row, row + form.shape(1));
-        its = Model::Form::from(last, dimension);
-      }
+      const auto [at, is_new] = forms.try_emplace(FormNumbers(row, row + form.shape(1)));
+      auto &its = at->second;
+      if (is_new) its = Model::Form::from(at->first, dimension);
       std::optional<Shape> shape;
       if (its) shape = Model::shape_from(0.5 * read_vec<3>(diameters.data() + 3 * i), *its);
       require(shape.has_value(), "particle " + std::to_string(i) +

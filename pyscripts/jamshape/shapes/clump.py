@@ -204,7 +204,7 @@ def _joined(pieces: list[FloatArray]) -> FloatArray:
     return np.concatenate([first, first[:1] if around else first[:0], *around])
 
 
-def dimer(ratio: float = 1.0, distance: float = 1.0) -> FloatArray:
+def dimer_discs(ratio: float = 1.0, distance: float = 1.0) -> FloatArray:
     """Return the discs of a dimer, the first of diameter 1.
 
     Parameters
@@ -221,13 +221,13 @@ def dimer(ratio: float = 1.0, distance: float = 1.0) -> FloatArray:
 
     Examples
     --------
-    >>> dimer(0.5).tolist()
+    >>> dimer_discs(0.5).tolist()
     [[0.0, 0.0, 0.5], [0.75, 0.0, 0.25]]
     """
     return np.array([[0.0, 0.0, 0.5], [distance * (1 + ratio) / 2, 0.0, ratio / 2]])
 
 
-def trimer(angle: float = 60.0) -> FloatArray:
+def trimer_discs(angle: float = 60.0) -> FloatArray:
     """Return three discs of diameter 1, the outer two touching the middle one, at an angle between them.
 
     Parameters
@@ -242,7 +242,7 @@ def trimer(angle: float = 60.0) -> FloatArray:
 
     Examples
     --------
-    >>> trimer(180)[:, 0].round(6).tolist()
+    >>> trimer_discs(180)[:, 0].round(6).tolist()
     [0.0, -1.0, 1.0]
     """
     half = np.deg2rad(angle) / 2
@@ -250,7 +250,7 @@ def trimer(angle: float = 60.0) -> FloatArray:
     return np.array([[0.0, 0.0, 0.5], [-x, -y, 0.5], [x, -y, 0.5]])
 
 
-def bumpy(bumps: int = 12, depth: float = 0.2) -> FloatArray:
+def bumpy_discs(bumps: int = 12, depth: float = 0.2) -> FloatArray:
     """Return a ring of equal discs around a large one: a disc of diameter 1 with a rough surface (Papanikolaou et al. 2013).
 
     Parameters
@@ -272,12 +272,12 @@ def bumpy(bumps: int = 12, depth: float = 0.2) -> FloatArray:
 
     Examples
     --------
-    >>> rows = bumpy(8, 0.3)
+    >>> rows = bumpy_discs(8, 0.3)
     >>> float((rows[1:, 0] + rows[1:, 2]).max())
     0.5
     """
     if bumps < 3 or not 0 < depth <= 1:
-        msg = f"bumpy has bumps={bumps} and depth={depth}, expected at least 3 and a depth above 0, up to 1"
+        msg = f"bumpy_discs has bumps={bumps} and depth={depth}, expected at least 3 and a depth above 0, up to 1"
         raise ValueError(msg)
     half = np.pi / bumps
     # Bumps of radius r at distance 1/2 - r overlap so that notches are depth r below their tops.
