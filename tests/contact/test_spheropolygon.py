@@ -486,3 +486,18 @@ def test_forms_of_different_lengths_mix():
         np.unique(shape.measure.round(12)), sorted([*expected, np.pi * 0.09]), rtol=1e-11
     )
     assert "kinds" in mixture.told
+
+
+def test_rounding_radii_may_differ_from_particle_to_particle():
+    rounding = [0.1, 0.3, 0.1]
+    packing = js.Packing.of(
+        "spheropolygon",
+        position=[[1, 1], [4, 4], [7, 7]],
+        orientation=[0, 0, 0],
+        corners=regular_polygon(4),
+        rounding=rounding,
+        box=[9, 9],
+    )
+    np.testing.assert_array_equal(packing.form[:, 0], rounding)
+    area = [1 + 4 * R + np.pi * R * R for R in rounding]
+    np.testing.assert_allclose(packing.compiled().measure, area, rtol=1e-13)

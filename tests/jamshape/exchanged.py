@@ -11,7 +11,7 @@ from jamshape.shapes.table import SHAPES
 
 RESTS = ("position_rest", "orientation_rest", "edges_rest", "tilt_rest")
 
-PLACES = [(name, dimension) for name in SHAPES for dimension in (2, 3)]
+PLACES = [(name, dimension) for name in SHAPES for dimension in SHAPES[name].dimensions]
 
 
 def mixed(name, dimension, spread=0.05, n=12):
@@ -44,7 +44,7 @@ def assert_same(a, b):
     """Compare bit for bit, with what doubles leave out."""
     assert_identical(a, b)
     assert a.law == b.law
-    for name in ("exponent", *RESTS):
+    for name in ("form", *RESTS):
         assert getattr(a, name).tobytes() == getattr(b, name).tobytes(), name
 
 

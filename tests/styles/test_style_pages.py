@@ -65,7 +65,7 @@ def test_examples_run(name, text, tmp_path):
     "text", part_of("create_random", "Examples").split("```")[1].strip().splitlines()
 )
 def test_examples_of_the_command_run(text, tmp_path):
-    dimension = 2 if "spherocylinder" in text else 3
+    dimension = 2 if text.split()[1] in {"spherocylinder", "spheropolygon"} else 3
     said = run_lmp_well(f"{before_box(dimension)}\n{load_plugin()}\n{text}", tmp_path)
     assert "Created 64 particles at random" in said
 

@@ -408,7 +408,7 @@ def _packing(path: PathLike, frame: _Frame, wanted: Wanted) -> Packing:
     form = others.pop("form", frame.columns.get("form", np.empty((0, 0))))
     quaternion = stack(_QUATERNION)
     there = Geometry(stack(_POSITION), quaternion, stack(_DIAMETERS), frame.bounds, frame.tilt)
-    said = replace(frame.said, has_exponent=len(exponent) > 0, has_form=len(form) > 0)
+    said = replace(frame.said, has_exponent=len(exponent) > 0, form=form)
     dimension, shape, law = meaning = meaning_of(path, there, said, wanted)
     quaternion = meaning.turned(quaternion)
     lo, hi = frame.bounds[:dimension].T

@@ -18,7 +18,7 @@ from jamshape.arrays import FloatArray
 from jamshape.files.disk import PathLike
 from jamshape.packing import Packing
 from jamshape.packing.rotation import product
-from jamshape.shapes.shape import Interaction, stiffness_text
+from jamshape.shapes.shape import Interaction, Shape, stiffness_text
 from jamshape.shapes.table import SHAPES, Fitted, fitted, shape_named
 
 _ROUNDING = 1e-9  # of a length over a diameter, of a quaternion over its norm
@@ -48,8 +48,8 @@ class Said:
     """k_e and sides, if stated."""
     has_exponent: bool = False
     """Whether the file has exponents."""
-    has_form: bool = False
-    """Whether it has forms, as of clumps."""
+    form: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    """(N, K) forms, as of clumps; empty if it has none."""
     digits: int = 0
     """Largest number of significant digits of a coordinate; 0 if not counted."""
     is_scaled: bool = False
@@ -126,6 +126,17 @@ class Meaning(NamedTuple):
         return product(quaternion, _FROM_X[self.shape.first])
 
 
+def _takes(shape: Shape, form: FloatArray, dimension: int) -> bool:
+    """Whether forms may be of a shape, or, without any, whether it needs none."""
+    if not shape.has_form or not len(form):
+        return shape.has_form == (len(form) > 0)
+    try:
+        shape.check_form(form, dimension)
+    except ValueError:
+        return False
+    return True
+
+
 def meaning_of(path: PathLike, there: Geometry, said: Said, wanted: Wanted) -> Meaning:
     """Determine dimension, shape and law of the particles of a file, with warnings where doubtful.
 
@@ -152,10 +163,10 @@ def meaning_of(path: PathLike, there: Geometry, said: Said, wanted: Wanted) -> M
     able = [
         shape.name
         for shape in SHAPES.values()
-        if shape.has_exponent >= said.has_exponent and shape.has_form == said.has_form
+        if shape.has_exponent >= said.has_exponent and _takes(shape, said.form, dimension)
     ]
     if name and shape_named(name).name not in able:
-        has = "exponents" if said.has_exponent else "forms" if said.has_form else "no forms"
+        has = "exponents" if said.has_exponent else "forms" if len(said.form) else "no forms"
         which = f"which a {name} needs" if has == "no forms" else f"which no {name} has"
         msg = f"the file has {has}, {which}, expected one of {', '.join(able)}"
         raise ValueError(msg)

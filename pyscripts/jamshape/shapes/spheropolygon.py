@@ -132,10 +132,12 @@ class Spheropolygon(Shape):
         self, parameters: Mapping[str, Any], size: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """See `Shape.sizes`."""
-        rounding = float(parameters["rounding"])
-        rows = _placed(_corners_told(parameters["corners"]), rounding)
-        form = np.concatenate([[rounding], rows.ravel()])
-        return size[:, None] * (2 * _half_extents(form)), np.tile(form, (len(size), 1))
+        radii, which = np.unique(parameters["rounding"], return_inverse=True)
+        corners = _corners_told(parameters["corners"])
+        forms = np.array([np.append(radius, _placed(corners, radius)) for radius in radii])
+        extents = np.array([_half_extents(form) for form in forms])
+        which = np.broadcast_to(which.reshape(-1), len(size))
+        return size[:, None] * (2 * extents[which]), forms[which]
 
     def parameters_of(
         self, diameters: FloatArray, form: FloatArray

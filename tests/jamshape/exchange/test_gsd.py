@@ -114,7 +114,10 @@ def reach_of(shape, dimension):
         case "Ellipsoid":
             return max(shape[axis] for axis in "abc"[:dimension])
         case "SphereUnion":
-            return np.linalg.norm(shape["centers"][0]) + shape["diameters"][0] / 2
+            away = np.linalg.norm(shape["centers"], axis=1)
+            return (away + np.array(shape["diameters"]) / 2).max()
+        case "Polygon":
+            return np.linalg.norm(shape["vertices"], axis=1).max() + shape["rounding_radius"]
         case "Mesh":
             return np.linalg.norm(np.array(shape["vertices"])[:, :dimension], axis=1).max()
 
@@ -122,10 +125,12 @@ def reach_of(shape, dimension):
 def test_bodies_are_named_by_what_they_are(path):
     found = {}
     for name in SHAPES:
-        write_gsd(path, mixed(name, 3, spread=0))
+        write_gsd(path, mixed(name, SHAPES[name].dimensions[-1], spread=0))
         found[name] = {shape["type"] for shape in native(path).particles.type_shapes}
     assert found["spherocylinder"] == {"Mesh", "Sphere"}
     assert found["dimer"] == {"SphereUnion"}
+    assert found["clump"] == {"SphereUnion"}
+    assert found["spheropolygon"] == {"Polygon"}
     assert found["superellipsoid"] == {"Mesh", "Ellipsoid", "Sphere"}
 
 

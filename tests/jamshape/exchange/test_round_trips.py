@@ -81,7 +81,7 @@ KEPT = {
     "`k_e`, also of each pair of types": exact(lambda p: p.law.k_e),
     "`sides` of rods": lambda a, b: NO if b.shape_style == "spherocylinder" and a.law != b.law else YES,
     "sizes": exact(lambda p: p.diameters),
-    "exponents": exact(lambda p: p.exponent),
+    "exponents, discs, corners": exact(lambda p: p.form),
     "IDs and types": exact(lambda p: [p.id, p.species]),
     "unwrapped positions": close(lambda p: p.position + p.box.vectors(p.image)),
     "orientations": close(rotations),

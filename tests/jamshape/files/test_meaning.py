@@ -280,28 +280,34 @@ def test_six_digits_are_said_to_cost_overlaps(path):
         js.load(path, shape=RODS)
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize(
+    ("name", "dimension"),
+    [(name, dimension) for name, shape in SHAPES.items() for dimension in shape.dimensions],
+)
 def test_what_we_write_says_what_it_holds(path, name, dimension):
-    exponent = [1.5, 2.5] if SHAPES[name].has_exponent else [1, 1]
+    shape = SHAPES[name]
+    usual = {p.name: p.read(p.default) for p in shape.parameters}
+    diameters, form = shape.sizes(usual, np.array([1.0, 1.3]))
+    if shape.has_exponent:
+        form = np.array([[1.5], [2.5]])
     here = np.zeros((2, dimension))
     here[1, 0] = 1.9
     packing = Packing(
         position=1 + here,
         orientation=[0.1, 0.2] if dimension == 2 else [[1, 0, 0, 0]] * 2,
-        diameters=[[2, 2, 2]] * 2,
+        diameters=diameters,
         species=[1, 1],
         id=[2, 1],
         box=Box(lo=[0] * dimension, edges=[8] * dimension),
         shape_style=name,
-        exponent=exponent,
+        form=form,
         law=Interaction(2.5, 1),
     )
     js.save(path.with_suffix(".data"), packing)
     found, expected = js.load(path.with_suffix(".data")), packing.sorted_by_id()
     for field in ("dimension", "shape_style", "law", "phi", "n"):
         assert getattr(found, field) == getattr(expected, field), field
-    np.testing.assert_array_equal(found.exponent, expected.exponent)
+    np.testing.assert_array_equal(found.form, expected.form)
     np.testing.assert_array_equal(found.diameters, expected.diameters)
 
 

@@ -23,8 +23,10 @@ def fields_alike(one, other):
     )
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
-@pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
+PLACES = [(shape, D) for shape in SHAPES.values() for D in shape.dimensions]
+
+
+@pytest.mark.parametrize(("shape", "dimension"), PLACES, ids=str)
 def test_parameters_and_sizes_or_diameters_give_back_a_packing(shape, dimension):
     for parameters in shape.examples:
         packing = random_packing(6, 0.05, 1, Particles.of(shape, 1.4, **parameters), dimension)
@@ -32,11 +34,15 @@ def test_parameters_and_sizes_or_diameters_give_back_a_packing(shape, dimension)
         arrays |= {"species": packing.species, "k_e": 2.0, "sides": 1}
         expected = packing.with_(law=js.Interaction(2.0, 1))
         size = [(1.0, 1.4)[k - 1] for k in packing.species]
-        each = {name: np.full(6, value) for name, value in parameters.items()}
+        each = {
+            name: value if isinstance(value, str) else np.full(6, value)
+            for name, value in parameters.items()
+        }
         by_option = {p.option: parameters[p.name] for p in shape.parameters}
         sizes = [{"size": size} | parameters, {"size": size} | each, {"size": size} | by_option]
         exponent = {"exponent": packing.exponent} if shape.has_exponent else {}
-        sizes.append({"diameters": packing.diameters} | exponent)
+        if not shape.has_form:
+            sizes.append({"diameters": packing.diameters} | exponent)
         for box in (packing.box, packing.box.edges, packing.box.matrix):
             for known in sizes:
                 found = js.Packing.of(shape.name, **arrays, box=box, **known)
