@@ -508,3 +508,12 @@ def test_forms_of_different_lengths_mix():
     area = SHAPE.compiled((sizes.diameters, sizes.form), 2, js.Interaction()).measure
     expected = np.pi / 4 * np.array([2, 3 * 1.44, 0.64])
     np.testing.assert_allclose(np.unique(area.round(12)), np.sort(expected), rtol=1e-11)
+
+
+@pytest.mark.parametrize("bumps", [5, 9, 12, 30])
+def test_outlines_of_rough_discs_are_one_curve(bumps):
+    """The large disc passes through all notches, where rounding leaves arcs of no length."""
+    sizes = js.Clumps(discs=bumpy_discs(bumps, 0.5)).sample(1, np.random.default_rng(1))
+    points = SHAPE.outline(sizes.diameters[0], sizes.form[0], 20 * bumps)
+    longest = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1).max()
+    assert longest < 0.1

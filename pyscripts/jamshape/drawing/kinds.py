@@ -68,5 +68,8 @@ def _named(packing: Packing, own: BoolArray) -> tuple[str, str]:
     sizes = np.array([size for _, size in known])
     low, high = sizes.min(), sizes.max()
     size = f"{low:.3g}" if np.isclose(low, high) else rf"{low:.3g}\dots {high:.3g}"
-    parameters = {name: float(f"{value:.3g}") for name, value in known[0][0].items()}
+    parameters = {
+        name: value if isinstance(value, str) else float(f"{value:.3g}")
+        for name, value in known[0][0].items()
+    }
     return shape.label(parameters), f"${shape.unit}={size}$"

@@ -20,6 +20,7 @@ from jamshape.shapes.shape import MOST_NUMBERS, Parameter, Shape
 from jamshape.shapes.solid import Balls
 
 _WIDTH = 4  # numbers of a disc: x y z r
+_POINT = 1e-9  # radians; where three circles meet, rounding leaves arcs that have no direction
 
 
 class Discs(Parameter):
@@ -146,6 +147,7 @@ class Clump(Shape):
         contact = importlib.import_module("jamshape._contact")
         rows = self._placed_discs(diameters, form)
         arcs = contact.boundary_arcs(rows)
+        arcs = arcs[arcs[:, 2] - arcs[:, 1] > _POINT]
         least = max(8, points // len(arcs))
         pieces = [
             rows[int(k), :2] + rows[int(k), 3] * arc(begin, end, least) for k, begin, end in arcs

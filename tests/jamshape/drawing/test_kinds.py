@@ -5,6 +5,7 @@ from jamshape.contacts import Contacts, find_contacts
 from jamshape.drawing.colors import by_kind
 from jamshape.drawing.kinds import MOST, kinds_of
 from jamshape.protocols.random_start import random_packing
+from jamshape.shapes.particles import Kind, Particles
 
 
 def test_small_and_big_particles_of_one_shape():
@@ -47,3 +48,11 @@ def test_rattlers_are_grey_unless_all_are():
     assert np.ptp(some.rgb[2]) == 0
     every = by_kind(Contacts(packing, network, np.ones(8, bool)))
     assert len(every.legend) == 2
+
+
+def test_kinds_are_named_whose_parameters_are_texts():
+    particles = Particles.mixture(
+        "clump", [Kind({"discs": "0 0 1/1 0 1"}), Kind({"discs": "0 0 1"})]
+    )
+    kinds = kinds_of(random_packing(6, 0.2, 1, particles))
+    assert sorted(kinds.labels) == ["$1$ disc, $s=1$ (3)", "$2$ discs, $s=1$ (3)"]
