@@ -14,6 +14,7 @@ template <int D> struct ContactBlock {
   int n = 0, i[MOST], j[MOST];
   alignas(64) double separation[D][MOST];
   alignas(64) double k_e[MOST];
+  double margin = 0.0;  // added to the distances of first touch, where only `touching` is needed
 
   /// One bit per pair: whether it touches, whether it is also `alone`, of a rare kind left to the
   /// code for single pairs, and whether it has two bonds. The members below are set for pairs that

@@ -40,7 +40,7 @@ SpherocylinderContact<D, Pack> pairs_of(const SpherocylinderBody<D> *bodies,
   for (int a = 0; a < D; ++a) pair.r[a] = Pack::load(block.separation[a] + first);
   const SpherocylinderLawOf<Pack> of_lanes{
       {Pack::load(block.k_e + first)}, law.sides, law.shortcuts};
-  return {pair, i.radius, j.radius, of_lanes};
+  return {pair, i.radius, j.radius + block.margin, of_lanes};
 }
 
 }  // namespace

@@ -451,7 +451,7 @@ struct SpherocylinderModel : AlongX<Spherocylinder> {
 template <InstructionSet SET, int D> FindContacts<SpherocylinderModel, D> find_rod_contacts;
 
 template <int D> struct PacksOf<SpherocylinderModel, D> {
-  static constexpr bool EXIST = true;
+  static constexpr bool EXIST = true, CHOOSE = true;
   static bool take(const Spherocylinder &, const Spherocylinder &) { return true; }
 
   static FindContacts<SpherocylinderModel, D> *of(InstructionSet set)
