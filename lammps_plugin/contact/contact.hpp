@@ -86,7 +86,8 @@ template <class Model, int D, class S = double> using ContactOf = Contact<D, S, 
 
 /// The contacts of as many pairs as a pack has lanes, without bonds: energies and their derivatives
 /// of those that touch. A lane marked `alone` is of a rare kind and left to the code for single
-/// pairs; `further` lanes, which may have a second bond, take longer and go into packs of their own.
+/// pairs; `further` lanes, which may have a second bond, take longer and go into packs of their
+/// own.
 template <int D, class S> struct ContactLanes {
   S energy{0.0};
   Vec<D, S> force{};

@@ -275,7 +275,8 @@ struct OverdampedFlow::Weights {
 
 /// Displacement in coordinates of the box of strain 0 and rotation vector.
 template <int D>
-[[gnu::always_inline]] inline RateIn<D> OverdampedFlow::sum_of(const Row<D> &of, const Weights &m, RateIn<D> present) const
+[[gnu::always_inline]] inline RateIn<D> OverdampedFlow::sum_of(const Row<D> &of, const Weights &m,
+                                                               RateIn<D> present) const
 {
   const RateIn<D> stored = of.stored_rate();
   RateIn<D> sum{m.stored * stored.shift, m.stored * stored.turn};
@@ -294,7 +295,8 @@ template <int D>
 }
 
 template <int D>
-[[gnu::always_inline]] inline void OverdampedFlow::require_small(int i, const RateIn<D> &moved, const Upper &deformation)
+[[gnu::always_inline]] inline void OverdampedFlow::require_small(int i, const RateIn<D> &moved,
+                                                                 const Upper &deformation)
 {
   const Mobilities::Mobility &of = mobilities[i];
   const double limit = step_limit(of);

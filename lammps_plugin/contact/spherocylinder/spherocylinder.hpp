@@ -171,7 +171,8 @@ template <int D, class S> class SpherocylinderContact {
     if (law.sides == Sides::ONE) lanes.alone = lanes.alone | (is_parallel() & !round);
     lanes.alone = lanes.touching & lanes.alone;
     if (law.sides == Sides::TWO) {
-      lanes.further = lanes.touching & !(lanes.alone | round) & far_ends_may_touch(pair, closest, reach);
+      lanes.further =
+          lanes.touching & !(lanes.alone | round) & far_ends_may_touch(pair, closest, reach);
     }
     lanes.bond_force += add_load(lanes, closest, sqrt(closest.distance_sq), whole()).size;
     return lanes;
