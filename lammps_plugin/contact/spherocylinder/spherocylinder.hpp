@@ -124,7 +124,22 @@ template <int D, class S> class SpherocylinderContact {
     }
   }
 
-  /// Evaluates lanes all of which were found to be `shared`.
+  /// Evaluates lanes that `evaluate_lanes` left, which may have a second bond: two full ones or
+  /// one. Those that share an energy are left to `evaluate_shared_lanes`.
+  ContactLanes<D, S> evaluate_far_lanes() const
+  {
+    const EndFeet<D, S> ends(pair);
+    const Feet<D, S> closest = closest_to_end(pair, ends.nearer()), far_end = ends.farther();
+    ContactLanes<D, S> lanes;
+    lanes.touching = touches(closest.distance_sq);
+    const S distance = sqrt(closest.distance_sq);
+    const Truth<S> far = lanes.touching & touches(far_end.distance_sq);
+    if (any(far)) add_far_ends(lanes, far, distance, far_end);
+    lanes.bond_force += add_load(lanes, closest, distance, whole()).size;
+    return lanes;
+  }
+
+  /// Evaluates lanes that `evaluate_far_lanes` left.
   ContactLanes<D, S> evaluate_shared_lanes() const
   {
     const EndFeet<D, S> ends(pair);
@@ -143,11 +158,11 @@ template <int D, class S> class SpherocylinderContact {
     return lanes;
   }
 
-  /// Evaluates all lanes of a pack except the rare ones.
+  /// Evaluates lanes with one bond, except the rare ones.
   ContactLanes<D, S> evaluate_lanes() const
   {
     const Truth<S> round = (pair.A_i == S(0.0)) & (pair.A_j == S(0.0));
-    Feet<D, S> closest =
+    const Feet<D, S> closest =
         law.shortcuts && all(round) ? feet_at(pair, S(0.0), S(0.0)) : closest_feet(pair);
     ContactLanes<D, S> lanes;
     lanes.touching = touches(closest.distance_sq);
@@ -155,7 +170,10 @@ template <int D, class S> class SpherocylinderContact {
     lanes.alone = is_coincident(closest) | spines_cross(pair);
     if (law.sides == Sides::ONE) lanes.alone = lanes.alone | (is_parallel() & !round);
     lanes.alone = lanes.touching & lanes.alone;
-    if (law.sides == Sides::TWO) add_far_ends(lanes, closest);
+    if (law.sides == Sides::TWO) {
+      lanes.further =
+          lanes.touching & !(lanes.alone | round) & far_ends_may_touch(pair, closest, reach);
+    }
     lanes.bond_force += add_load(lanes, closest, sqrt(closest.distance_sq), whole()).size;
     return lanes;
   }
@@ -307,20 +325,14 @@ template <int D, class S> class SpherocylinderContact {
     return contact;
   }
 
-  /// Adds the second bond of lanes with two full bonds.
-  void add_far_ends(ContactLanes<D, S> &lanes, Feet<D, S> &closest) const
+  /// Adds the second bond of lanes with two full bonds to those whose far ends touch.
+  void add_far_ends(ContactLanes<D, S> &lanes, const Truth<S> &far, const S &distance,
+                    const Feet<D, S> &far_end) const
   {
-    const Truth<S> opposite = lanes.touching & far_ends_may_touch(pair, closest, reach);
-    if (!any(opposite)) return;
-    const EndFeet<D, S> ends(pair);
-    closest = chosen(opposite, closest_to_end(pair, ends.nearer()), closest);
-    const Feet<D, S> far_end = ends.farther();
-    const Truth<S> far = opposite & touches(far_end.distance_sq);
-    if (!any(far)) return;
-    const S distance = sqrt(closest.distance_sq), far_distance = sqrt(far_end.distance_sq);
+    const S far_distance = sqrt(far_end.distance_sq);
     const SideBySide<S> at(pair, overlap_at(0.5 * (distance + far_distance)), reach);
     lanes.two_bonds = far & at.has_two_bonds();
-    lanes.shared = far & !lanes.two_bonds & !at.has_one_bond() & !lanes.alone;
+    lanes.further = far & !lanes.two_bonds & !at.has_one_bond();
     const S distance_of_second = select(lanes.two_bonds, far_distance, S(reach));
     lanes.bond_force += add_load(lanes, far_end, distance_of_second, whole()).size;
   }
@@ -440,7 +452,7 @@ struct SpherocylinderModel : AlongX<Spherocylinder> {
 template <InstructionSet SET, int D> FindContacts<SpherocylinderModel, D> find_rod_contacts;
 
 template <int D> struct PacksOf<SpherocylinderModel, D> {
-  static constexpr bool EXIST = true;
+  static constexpr bool EXIST = true, CHOOSE = true;
   static bool take(const Spherocylinder &, const Spherocylinder &) { return true; }
 
   static FindContacts<SpherocylinderModel, D> *of(InstructionSet set)

@@ -322,7 +322,7 @@ template <InstructionSet SET, int D>
 FindContacts<SuperellipsoidModel, D> find_superellipsoid_contacts;
 
 template <int D> struct PacksOf<SuperellipsoidModel, D> {
-  static constexpr bool EXIST = true;
+  static constexpr bool EXIST = true, CHOOSE = false;
   static bool take(const Superellipsoid &shape, const Superellipsoid &first)
   {
     return shape.p == first.p;
