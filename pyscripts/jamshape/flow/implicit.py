@@ -457,6 +457,7 @@ class ImplicitFlow:
             flow.state = flow.state.with_least_tilt()
             self.local_model.move_to(flow.state)
             self.local_model.forget_pairs()
+            self._kinks = flow._kinks
             flow._is_fresh = False
         self.local_model.hold()
         self.orientation = flow.state.orientation.astype(np.float64)
@@ -485,6 +486,8 @@ class ImplicitFlow:
         clipped = dt >= 0.999 * longest
         dt = longest if clipped else dt
         explicit = flow.explicit_left > 0 or dt < self._stable
+        if len(self._kinks) and dt > _LEAST_STEP * self._stable:
+            explicit = False  # which would go from one side of a kink to the other
         if explicit:
             dt, clipped = min(dt, self._stable), False
         return _Trial(dt, clipped, explicit)
