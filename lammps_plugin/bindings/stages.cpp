@@ -27,7 +27,7 @@ struct StageKinks {
 
 StageEnd solve_stage(LocalEnergyModel &of, const PosedStage &stage,
                      const std::shared_ptr<Factors> &factors, std::size_t n_bonds,
-                     const StageKinks &kinks, const nb::callable &renew)
+                     const nb::callable &renew, const StageKinks &kinks)
 {
   for (const auto *part :
        {&stage.equation.drag, &stage.equation.centre, &stage.guess, &stage.other}) {
@@ -113,9 +113,10 @@ void export_stages(nb::module_ &m)
       .def_ro("solved", &StageEnd::solved);
   nb::borrow<nb::class_<LocalEnergyModel>>(nb::type<LocalEnergyModel>())
       .def("solve_stage", &solve_stage, "stage"_a, "factors"_a.none(), "bonds_of_factors"_a,
-           "kinks"_a, "renew"_a,
+           "renew"_a, "kinks"_a = StageKinks{},
            "Solve a Stage, with factors of an earlier one, the number of bonds at the point of\n"
-           "their Hessian, and the kinks where it ended; renew(x, strain) takes pairs that hold there. Returns a StageEnd.");
+           "their Hessian, and the kinks on which it ended; renew(x, strain) takes pairs that hold\n"
+           "there. Returns a StageEnd.");
 }
 
 }  // namespace jamshape

@@ -239,6 +239,7 @@ class StageSolver {
   Correction factorised(const Point &at)
   {
     size_before = 0.0;
+    each_held([&](std::size_t k) { held[k].stiffness = stiffness_across(at.kinks[k]); });
     std::vector<Kink> kinks = kinks_held();
     about.hold_kinks(kinks);
     known = {about.factorise({at.x.data(), 0.0}, stage.drag), at.sums.n_bonds, std::move(kinks)};
@@ -286,6 +287,12 @@ class StageSolver {
     std::copy_if(held.begin(), held.end(), std::back_inserter(kinks),
                  [](const Kink &kink) { return kink.is_held; });
     return kinks;
+  }
+
+  double stiffness_across(const KinkThere &kink) const
+  {
+    const double least = LEAST_JUMP * units.force;
+    return STIFF * units.stiffness() / std::max(kink.jump_squared(), least * least);
   }
 
   template <class Then> void each_held(const Then &then) const
@@ -364,7 +371,6 @@ class StageSolver {
       // Only the larger of two pieces holds a state, and only where the slope jumps.
       const double jump = there[k].exists ? std::sqrt(there[k].jump_squared()) : 0.0;
       if (!(jump > LEAST_JUMP * units.force) || there[k].gap < 0.0) continue;
-      found[k].stiffness = STIFF * units.stiffness() / (jump * jump);
       held.push_back(found[k]);
       tried.kinks.push_back(there[k]);
       any = true;

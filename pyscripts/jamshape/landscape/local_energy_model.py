@@ -179,7 +179,7 @@ class LocalEnergyModel:
         return Factorisation(self._compiled.factorise(x, strain, diagonal))
 
     def solve(
-        self, stage: Stage, known: StageFactors | StageKinks, units: Units, accuracy: float
+        self, stage: Stage, known: StageFactors | StageKinks | None, units: Units, accuracy: float
     ) -> Solution:
         """Solve a stage until the next correction is smaller than an accuracy in these units.
 
@@ -194,11 +194,10 @@ class LocalEnergyModel:
         posed = _contact.Stage(
             stage.drag, stage.centre, stage.extended, units, limits, *stage.guesses
         )
+        factors, n_bonds, kinks = None, 0, known or StageKinks()
         if isinstance(known, StageFactors):
-            earlier = (known.factors.compiled, known.n_bonds, known.kinks)
-        else:
-            earlier = (None, 0, known)
-        end = self._compiled.solve_stage(posed, *earlier, self._renew)
+            factors, n_bonds, kinks = known.factors.compiled, known.n_bonds, known.kinks
+        end = self._compiled.solve_stage(posed, factors, n_bonds, self._renew, kinks)
         self.landscape.evaluations += end.evaluations
         found = None
         if end.factors is not None:
