@@ -101,7 +101,7 @@ class StageSolver {
     Point at = begin(guess, other);
     see_kinks(at);
     Vector before = Vector::Zero(guess.size());
-    for (; directions < DIRECTIONS && !at.sums.is_refused(); ++directions) {
+    for (; directions < most() && !at.sums.is_refused(); ++directions) {
       const Correction correction = correction_at(at);
       if (!known.factors || !correction.step.allFinite()) break;
       if (is_last(correction.size)) {
@@ -113,7 +113,7 @@ class StageSolver {
       const double part = about.part_within(correction.step.data(), limits.step);
       const Vector step = part * correction.step;
       move_weights(correction, part);
-      const double down = slope(at).dot(step);
+      const double down = pushed(at).dot(step);
       Point tried = point(at.x + step);
       if (!tried.sums.is_refused()) {
         see_kinks(tried);
@@ -121,8 +121,10 @@ class StageSolver {
           size_before = 0.0;
         } else if (is_past_a_kink(at, tried, step, before, correction.size)) {
           tried = between(at, std::move(tried), limits.accuracy / correction.size);
-        } else if (slope(tried).dot(step) > -down) {
-          tried = point(at.x + lowest(at, tried, step, part) * step);
+        } else if (const double up = pushed(tried).dot(step); up > -down) {
+          const double shorter =
+              kinks_held().empty() ? lowest(at, tried, step, part) : down / (down - up);
+          tried = point(at.x + shorter * step);
           see_kinks(tried);
           size_before = 0.0;
         }
@@ -189,6 +191,9 @@ class StageSolver {
   std::vector<Kink> held;  // on which the state is held, or from which it was released to a side
   int evaluations = 0, factorisations = 0, directions = 0;
   double size_before = 0.0;  // of the last correction by these factors after a full step
+
+  /// Most directions: the kinks are known only after some.
+  int most() const { return held.empty() ? DIRECTIONS : 2 * DIRECTIONS; }
 
   StageEnd end(Point at, bool solved)
   {
@@ -267,11 +272,8 @@ class StageSolver {
   /// 1, 97 (1976)). The factors include stiffness J J^T, as sparse as H, since a kink is of one pair.
   Correction newton_on_kinks(const Point &at) const
   {
-    Vector pull = -slope(at), right = pull;
-    each_held([&](std::size_t k) {
-      at.kinks[k].add(-held[k].stiffness * at.kinks[k].gap, at.kinks[k].jump, right);
-    });
-    Correction found{known.factors->solve(right), 0.0, std::vector<double>(held.size())};
+    Vector pull = -slope(at);
+    Correction found{known.factors->solve(-pushed(at)), 0.0, std::vector<double>(held.size())};
     each_held([&](std::size_t k) {
       const KinkThere &there = at.kinks[k];
       found.weights[k] = held[k].stiffness * (there.gap + there.across(found.step));
@@ -310,6 +312,16 @@ class StageSolver {
       at.kinks[k].add(1.0, at.kinks[k].change, found);
       at.kinks[k].add(held[k].weight, at.kinks[k].jump, found);
     }
+    return found;
+  }
+
+  /// With the pull onto the kinks: what Newton's step makes zero.
+  Vector pushed(const Point &at) const
+  {
+    Vector found = slope(at);
+    each_held([&](std::size_t k) {
+      at.kinks[k].add(held[k].stiffness * at.kinks[k].gap, at.kinks[k].jump, found);
+    });
     return found;
   }
 

@@ -262,7 +262,8 @@ def slow_compress(
     for _, rate in protocol.rates:
         require_stated(kappa=rate)
     at = place(file, "slow.h5")
-    of = _start_of(particles, start, phi=(phi_start, phi_end), n=n, seed=seed, dimension=dimension)
+    sizes = {"n": n, "seed": seed, "dimension": dimension}
+    of = _start_of(particles, start, phi=(phi_start, phi_end), sides=sides, **sizes)
     require_known_kinks(sides, of.dimension)
 
     def first() -> Packing:
@@ -281,6 +282,7 @@ def _start_of(
     particles: Particles | None,
     start: Held | None,
     phi: tuple[float | None, float],
+    sides: int,
     **sizes: int | None,
 ) -> Start:
     """Return the start of a slow compression; refuse a packing fraction that differs from that of a given one."""
@@ -292,7 +294,7 @@ def _start_of(
         require_in("phi_start", phi_start, _HANDED_OVER if dimension == 2 else RANGES["phi_start"])
         require_rising(phi_start, phi_end)
         return Start.of(particles, Asked(phi=phi_start, **sizes), None, usual_phi=phi_start)
-    of = Start.of(particles, Asked(phi=None, **sizes), start, usual_phi=phi_end)
+    of = Start.of(particles, Asked(phi=None, **sizes), start, usual_phi=phi_end, sides=sides)
     if (
         of.known
         and phi_start is not None

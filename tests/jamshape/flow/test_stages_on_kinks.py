@@ -1,13 +1,13 @@
 """Implicit steps of contacts that stay on a kink of the energy, where a mixture of both slopes balances the drag."""
 
-import itertools
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 import jamshape as js
+from jamshape.flow.compression import Compression, CompressionRun
 from jamshape.flow.implicit import Flow, ImplicitFlow, Protocol, drag_coefficients
+from jamshape.lammps.session import Session
 from jamshape.landscape import Landscape, State
 from jamshape.landscape.local_energy_model import LocalEnergyModel, Stage, Units
 
@@ -117,7 +117,7 @@ def stage_of(packing, h):
     return model, drag_coefficients(landscape) / h, units
 
 
-@pytest.mark.parametrize("h", [1.0, 3.0, 10.0])
+@pytest.mark.parametrize("h", [3.0, 10.0])
 def test_a_stage_ends_where_a_mixture_of_both_slopes_balances_the_drag(h):
     packing = side_by_side()
     tilted = packing.with_(orientation=[1e-4, 0.0])
@@ -150,41 +150,30 @@ def test_a_kink_that_the_drag_leads_off_is_released():
     assert np.abs(gradient).max() < 1e-6 * units.force
 
 
-def nearly_round(sides):
-    start = js.slow_compress(
-        js.Spherocylinders(alpha=0.01), n=24, phi=(0.8, 0.83), kappa=1e-5, progress=False
-    )[-1]
-    return start.with_(law=start.law.but(sides=sides))
-
-
 @pytest.mark.lammps
 @pytest.mark.parametrize("sides", [1, 2])
 def test_both_integrators_compress_nearly_round_rods_alike(sides, tmp_path, measured):
-    start = nearly_round(sides)
-    kappa, phi_end = 1e-5, 0.87
-    slow = js.slow_compress(start=start, phi=(None, phi_end), kappa=kappa, sides=sides,
-                            integration_tolerance=1e-4, file=tmp_path / "slow.h5", progress=False)  # fmt: skip
-    steps = 1 + int(np.log(phi_end / start.phi) / 2 / kappa / 0.02)
-    assert steps < 200000
-    fast = _heun(start, kappa, phi_end, sides)
-    p = np.interp(fast[:, 0], slow.phi, slow.pressure)
-    far = np.abs(p / fast[:, 1] - 1)
+    """The pressure of a jammed packing, from the same start; where it flows, paths part like samples."""
+    common = {"kappa": 1e-5, "progress": False}
+    before = js.slow_compress(
+        js.Spherocylinders(alpha=0.01), n=24, phi=(0.8, 0.86), file=tmp_path / "a.h5", **common
+    )
+    start = list(before)[-1]
+    start = start.with_(law=start.law.but(sides=sides))
+    slow = js.slow_compress(start=start, phi=(None, 0.87), sides=sides, integration_tolerance=1e-4,
+                            file=tmp_path / "b.h5", **common)  # fmt: skip
+    phi, pressure = heun(start, Compression(kappa=1e-5, phi_end=0.87, sides=sides, dt=0.02), 20)
+    far = np.abs(np.interp(phi, slow.phi, slow["pressure"]) / pressure - 1)
     measured(median=np.median(far), largest=far.max())
-    assert np.median(far) < 2e-3
+    assert np.median(far) < 1e-3
 
 
-def _heun(start, kappa, phi_end, sides):
-    """(rows, 2) packing fractions and pressures of explicit steps."""
-    from jamshape.flow.compression import Compression, CompressionRun
-    from jamshape.lammps.session import Session
-
-    settings = Compression(kappa=kappa, phi_end=phi_end, sides=sides, integrator="heun", dt=0.02)
+def heun(start, settings, rows):
+    """Packing fractions and pressures of explicit steps of one size."""
     with Session() as session:
         run = CompressionRun(session, settings, start)
-        rows = []
-        for part in itertools.count(1):
-            run.advance(min(run.last_step, part * run.last_step // 20))
-            found = run.measure()
-            rows.append((found["phi"], found["pressure"]))
-            if part == 20:
-                return np.array(rows)
+        found = []
+        for row in range(rows):
+            run.advance((row + 1) * run.last_step // rows)
+            found.append(run.measure())
+    return np.array([[row[name] for row in found] for name in ("phi", "pressure")])
