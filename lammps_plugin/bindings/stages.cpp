@@ -87,20 +87,22 @@ void export_stages(nb::module_ &m)
   nb::class_<StageKinks>(m, "StageKinks", "Kinks of the energy on which a state is held.")
       .def(nb::init<>())
       .def("__len__", [](const StageKinks &of) { return of.all.size(); })
-      .def_prop_ro("particles",
-                   [](const StageKinks &of) {
-                     std::vector<std::pair<std::int64_t, std::int64_t>> found;
-                     for (const Kink &kink : of.all) found.push_back({kink.pair[0], kink.pair[1]});
-                     return found;
-                   },
-                   "Pairs of particles.")
-      .def_prop_ro("weights",
-                   [](const StageKinks &of) {
-                     std::vector<double> found;
-                     for (const Kink &kink : of.all) found.push_back(kink.weight);
-                     return found;
-                   },
-                   "Weights from 0 to 1 of the second of the two slopes.");
+      .def_prop_ro(
+          "particles",
+          [](const StageKinks &of) {
+            std::vector<std::pair<std::int64_t, std::int64_t>> found;
+            for (const Kink &kink : of.all) found.push_back({kink.pair[0], kink.pair[1]});
+            return found;
+          },
+          "Pairs of particles.")
+      .def_prop_ro(
+          "weights",
+          [](const StageKinks &of) {
+            std::vector<double> found;
+            for (const Kink &kink : of.all) found.push_back(kink.weight);
+            return found;
+          },
+          "Weights from 0 to 1 of the second of the two slopes.");
   nb::class_<StageEnd>(m, "StageEnd")
       .def_prop_ro("x", [](const StageEnd &end) { return array_of(end.x.data(), end.x.size()); })
       .def_prop_ro("sums", [](const StageEnd &end) { return tuple_of(end.sums); })
@@ -112,11 +114,12 @@ void export_stages(nb::module_ &m)
       .def_ro("directions", &StageEnd::directions)
       .def_ro("solved", &StageEnd::solved);
   nb::borrow<nb::class_<LocalEnergyModel>>(nb::type<LocalEnergyModel>())
-      .def("solve_stage", &solve_stage, "stage"_a, "factors"_a.none(), "bonds_of_factors"_a,
-           "renew"_a, "kinks"_a = StageKinks{},
-           "Solve a Stage, with factors of an earlier one, the number of bonds at the point of\n"
-           "their Hessian, and the kinks on which it ended; renew(x, strain) takes pairs that hold\n"
-           "there. Returns a StageEnd.");
+      .def(
+          "solve_stage", &solve_stage, "stage"_a, "factors"_a.none(), "bonds_of_factors"_a,
+          "renew"_a, "kinks"_a = StageKinks{},
+          "Solve a Stage, with factors of an earlier one, the number of bonds at the point of\n"
+          "their Hessian, and the kinks on which it ended; renew(x, strain) takes pairs that hold\n"
+          "there. Returns a StageEnd.");
 }
 
 }  // namespace jamshape

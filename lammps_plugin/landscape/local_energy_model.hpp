@@ -945,8 +945,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     std::vector<std::optional<std::size_t>> found(kinks.size());
     for (std::size_t p = 0; p < pairs.list().n; ++p) {
       for (std::size_t k = 0; k < kinks.size(); ++k) {
-        if (pairs.particles[2 * p] == kinks[k].pair[0] && name_of(p) == kinks[k].pair)
-          found[k] = p;
+        if (pairs.particles[2 * p] == kinks[k].pair[0] && name_of(p) == kinks[k].pair) found[k] = p;
       }
     }
     return found;

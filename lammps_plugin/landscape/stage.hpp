@@ -166,7 +166,7 @@ class StageSolver {
   struct Point {
     Vector x;
     LandscapeSums sums;
-    Vector gradient;  // of the minimised function
+    Vector gradient;                 // of the minimised function
     std::vector<KinkThere> kinks{};  // those held and released
   };
 
@@ -269,7 +269,8 @@ class StageSolver {
   /// Newton's step on the kinks, with the change of their weights: the solution of
   ///     (H + drag) q + sum of dw J = -slope,   J.q - dw / stiffness = -gap,
   /// J the jump across each kink (a proximal method of multipliers: Rockafellar, Math. Oper. Res.
-  /// 1, 97 (1976)). The factors include stiffness J J^T, as sparse as H, since a kink is of one pair.
+  /// 1, 97 (1976)). The factors include stiffness J J^T, as sparse as H, since a kink is of one
+  /// pair.
   Correction newton_on_kinks(const Point &at) const
   {
     Vector pull = -slope(at);

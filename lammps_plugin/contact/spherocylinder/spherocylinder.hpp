@@ -133,7 +133,8 @@ template <int D, class S> class SpherocylinderContact {
   {
     if (pair.A_i == 0.0 && pair.A_j == 0.0) return NO_TIP;
     const auto closest = closest_feet(pair);
-    if (!touches(closest.distance_sq) || is_coincident(closest) || spines_cross(pair)) return NO_TIP;
+    if (!touches(closest.distance_sq) || is_coincident(closest) || spines_cross(pair))
+      return NO_TIP;
     if (law.sides == Sides::ONE) return TipFeet<D, S>(pair).nearest();
     if (!far_ends_may_touch(pair, closest, reach)) return NO_TIP;
     const EndFeet<D, S> ends(pair);
@@ -432,8 +433,8 @@ struct SpherocylinderModel : AlongX<Spherocylinder> {
   }
   static double k_e(const Law &law) { return law.harmonic.k_e; }
 
-  /// In 2D the energy of a pair is the largest of several smooth pieces near its kinks, one for each
-  /// tip. The number of the one that it lies on; -1 without a contact that may have a kink.
+  /// In 2D the energy of a pair is the largest of several smooth pieces near its kinks, one for
+  /// each tip. The number of the one that it lies on; -1 without a contact that may have a kink.
   template <int D> static constexpr bool HAS_KINKS = D == 2;
   template <int D> static int piece(const Body<D> &i, const Body<D> &j, const Law &law)
   {
