@@ -59,6 +59,9 @@ template <class K> struct SpherocylinderLawOf {
   HarmonicOf<K> harmonic;
   Sides sides;
   bool shortcuts;  // false: also discs by the search for feet
+  /// In 2D a tip, as numbered by `TipFeet`: the farther end of two bonds, or the single bond, is
+  /// there, although another one may be closer. Then the energy has no kink.
+  int tip = NO_TIP;
 };
 using SpherocylinderLaw = SpherocylinderLawOf<double>;
 
@@ -116,12 +119,26 @@ template <int D, class S> class SpherocylinderContact {
     const auto closest = closest_feet(values);
     if (!touches(closest.distance_sq)) return without(ContactStatus::APART);
     if (is_coincident(closest) || spines_cross(values)) return without(ContactStatus::CROSSING);
+    if (law.tip != NO_TIP) return law.sides == Sides::TWO ? two_bonds() : bond_at_tip();
     if (law.sides == Sides::TWO && far_ends_may_touch(values, closest, reach)) return two_bonds();
     if constexpr (std::is_same_v<S, ValueOf<S>>) {
       return one_bond(closest);
     } else {
       return one_bond(closest_feet(pair));
     }
+  }
+
+  /// The tip where the farther end of two bonds is, or the single one of rods with sides one.
+  int tip() const
+  {
+    if (pair.A_i == 0.0 && pair.A_j == 0.0) return NO_TIP;
+    const auto closest = closest_feet(pair);
+    if (!touches(closest.distance_sq) || is_coincident(closest) || spines_cross(pair))
+      return NO_TIP;
+    if (law.sides == Sides::ONE) return TipFeet<D, S>(pair).nearest();
+    if (!far_ends_may_touch(pair, closest, reach)) return NO_TIP;
+    const EndFeet<D, S> ends(pair);
+    return touches(ends.farther().distance_sq) ? ends.tip_of_farther() : NO_TIP;
   }
 
   /// Evaluates lanes that `evaluate_lanes` left, which may have a second bond: two full ones or
@@ -239,11 +256,21 @@ template <int D, class S> class SpherocylinderContact {
     return contact;
   }
 
+  Found bond_at_tip() const
+  {
+    const Feet<D, S> feet = TipFeet<D, ValueOf<S>>(values_of(pair)).feet(pair, law.tip);
+    if (!touches(feet.distance_sq)) return without(ContactStatus::APART);
+    Found contact = without(ContactStatus::TOUCHING);
+    contact.kind = kind_of(pair, feet);
+    add_bond(contact, feet, sqrt(feet.distance_sq), whole());
+    return contact;
+  }
+
   S overlap_at(const S &distance) const { return (reach - distance) * inverse_reach; }
 
   Found two_bonds() const
   {
-    const EndFeet<D, S> ends(pair);
+    const EndFeet<D, S> ends(pair, law.tip);
     const Feet<D, S> closest = closest_to_end(pair, ends.nearer());  // never the farther, at a tie
     const Feet<D, S> &far_end = ends.farther();
     const S distance = sqrt(closest.distance_sq);
@@ -417,6 +444,21 @@ struct SpherocylinderModel : AlongX<Spherocylinder> {
     return {{k_e}, sides, shortcuts};
   }
   static double k_e(const Law &law) { return law.harmonic.k_e; }
+
+  /// In 2D the energy of a pair is the largest of several smooth pieces near its kinks, one for
+  /// each tip. The number of the one that it lies on; -1 without a contact that may have a kink.
+  template <int D> static constexpr bool HAS_KINKS = D == 2;
+  template <int D> static int piece(const Body<D> &i, const Body<D> &j, const Law &law)
+  {
+    return SpherocylinderContact<D, double>(i, j, law).tip();
+  }
+  /// The law of one of these pieces.
+  static Law on_piece(const Law &law, int piece)
+  {
+    Law of_piece = law;
+    of_piece.tip = piece;
+    return of_piece;
+  }
 
   /// Class of shapes whose contacts have a closed form.
   template <int D> static Shortcut shortcut(const Shape &shape)

@@ -191,6 +191,7 @@ struct SuperellipsoidModel {
   static constexpr const char *CORE = "centres";
   static constexpr int MOST_BONDS = 1;
   static constexpr bool HAS_SIDES = false;
+  template <int D> static constexpr bool HAS_KINKS = false;
   static constexpr bool BONDS_ARE_CONTACTS = false;
   static constexpr int OVERLAP_POWER = 2;
 
