@@ -28,10 +28,9 @@ _MOST_OPENINGS = 30
 _PART = 5000  # evaluations after which a long minimisation is reported and stored
 _MOST_PARTS = 40  # of them before it is given up
 
-# Before a search for an energy parts are shorter. After one the box is compressed further, once in a row, if U/N is
-# below a multiple of the energy tolerance, about what a step adds to a jammed packing: the search opens it again, while
-# the evaluations to the end of such a minimisation grow with N.
-_SHORT_PART = 1500
+# Before a search for an energy the box is compressed further after one part, once in a row, if U/N is below a multiple
+# of the energy tolerance, about what a step adds to a jammed packing: the search opens it again, while the evaluations
+# to the end of such a minimisation grow with N.
 _LITTLE = 50.0
 
 _FEW, _MANY = 40, 150  # evaluations of minimisations after which steps grow and shrink
@@ -174,7 +173,7 @@ def compress(
 
 def advance(landscape: Landscape, compression: QuasistaticRun, protocol: Quasistatic) -> None:
     """Minimise once, or for one part of a long minimisation; parameters and errors as `compress`."""
-    before, part = landscape.evaluations, _part(protocol)
+    before = landscape.evaluations
     try:
         found = _minimised(landscape, compression, protocol)
     except CrossingError:
@@ -191,12 +190,12 @@ def advance(landscape: Landscape, compression: QuasistaticRun, protocol: Quasist
     if is_unfinished and _may_be_left(compression, per_particle, protocol):
         compression.parts, compression.left = 0, True
         compression.loose, compression.loose_phi = found.state, compression.phi
-        compression.begin(_next_step(compression.step, part, protocol))
+        compression.begin(_next_step(compression.step, _PART, protocol))
         return
-    if is_unfinished and compression.parts * part < _MOST_PARTS * _PART:
+    if is_unfinished and compression.parts < _MOST_PARTS:
         compression.state = found.state
         return
-    evaluations = landscape.evaluations - before + (compression.parts - 1) * part
+    evaluations = landscape.evaluations - before + (compression.parts - 1) * _PART
     compression.parts, compression.left = 0, False
     if per_particle <= protocol.energy:
         _go_on_from_unjammed(compression, found, evaluations, protocol)
@@ -213,11 +212,6 @@ def advance(landscape: Landscape, compression: QuasistaticRun, protocol: Quasist
         compression.minimum, compression.state = found, found.state
     else:
         _go_on_from_jammed(landscape, compression, found, protocol)
-
-
-def _part(protocol: Quasistatic) -> int:
-    """Return the evaluations of a part of a minimisation."""
-    return _SHORT_PART if _is_rough(protocol) else _PART
 
 
 def _is_rough(protocol: Quasistatic) -> bool:
@@ -278,7 +272,7 @@ def _minimised(landscape: Landscape, compression: QuasistaticRun, protocol: Quas
     """Minimise until forces balance, or until the state is unjammed."""
     state = compression.state
     lowest = protocol.energy * landscape.particles.n / state.volume
-    stop = Stop(tolerance=protocol.tolerance, lowest=lowest, evaluations=_part(protocol))
+    stop = Stop(tolerance=protocol.tolerance, lowest=lowest, evaluations=_PART)
     is_near = compression.openings > 0 and protocol.method == "auto"
     method = "near" if is_near else protocol.method
     found = minimise(landscape, state, method, stop, compression.history)
