@@ -194,6 +194,7 @@ struct SpheropolygonModel {
   static constexpr bool HAS_SIDES = true;
   static constexpr bool BONDS_ARE_CONTACTS = false;
   static constexpr int OVERLAP_POWER = 1;
+  template <int D> static constexpr bool HAS_KINKS = false;
 
   static Law law(double k_e, Sides sides, bool shortcuts = true)
   {
