@@ -1,7 +1,12 @@
 #include "bindings/local_energy_model.hpp"
 #include "landscape/stage.hpp"
 
+#include <cstdint>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/vector.h>
+#include <utility>
+#include <vector>
 
 namespace jamshape {
 
@@ -15,9 +20,14 @@ struct PosedStage {
   Eigen::VectorXd guess, other;
 };
 
+/// The kinks on which a state is held.
+struct StageKinks {
+  std::vector<Kink> all;
+};
+
 StageEnd solve_stage(LocalEnergyModel &of, const PosedStage &stage,
                      const std::shared_ptr<Factors> &factors, std::size_t n_bonds,
-                     const nb::callable &renew)
+                     const nb::callable &renew, const StageKinks &kinks)
 {
   for (const auto *part :
        {&stage.equation.drag, &stage.equation.centre, &stage.guess, &stage.other}) {
@@ -28,7 +38,7 @@ StageEnd solve_stage(LocalEnergyModel &of, const PosedStage &stage,
   require_base(of);
   require(!factors || factors->size() == of.n(), "the factors have another number of coordinates.");
   return StageSolver(of, stage.equation, stage.units, stage.limits, renewing(of, renew))
-      .solve(stage.guess, stage.other, {factors, n_bonds});
+      .solve(stage.guess, stage.other, {factors, n_bonds, kinks.all});
 }
 
 double size_of(const StageUnits &units, const Array1<double> &shift, const Array1<double> &force,
@@ -74,20 +84,42 @@ void export_stages(nb::module_ &m)
                                    vector(other)};
           },
           "drag"_a, "centre"_a, "extended"_a, "units"_a, "limits"_a, "guess"_a, "other"_a);
+  nb::class_<StageKinks>(m, "StageKinks", "Kinks of the energy on which a state is held.")
+      .def(nb::init<>())
+      .def("__len__", [](const StageKinks &of) { return of.all.size(); })
+      .def_prop_ro(
+          "particles",
+          [](const StageKinks &of) {
+            std::vector<std::pair<std::int64_t, std::int64_t>> found;
+            for (const Kink &kink : of.all) found.push_back({kink.pair[0], kink.pair[1]});
+            return found;
+          },
+          "Pairs of particles.")
+      .def_prop_ro(
+          "weights",
+          [](const StageKinks &of) {
+            std::vector<double> found;
+            for (const Kink &kink : of.all) found.push_back(kink.weight);
+            return found;
+          },
+          "Weights from 0 to 1 of the second of the two slopes.");
   nb::class_<StageEnd>(m, "StageEnd")
       .def_prop_ro("x", [](const StageEnd &end) { return array_of(end.x.data(), end.x.size()); })
       .def_prop_ro("sums", [](const StageEnd &end) { return tuple_of(end.sums); })
       .def_prop_ro("factors", [](const StageEnd &end) { return end.found.factors; })
       .def_prop_ro("bonds_of_factors", [](const StageEnd &end) { return end.found.n_bonds; })
+      .def_prop_ro("kinks", [](const StageEnd &end) { return StageKinks{end.found.kinks}; })
       .def_ro("evaluations", &StageEnd::evaluations)
       .def_ro("factorisations", &StageEnd::factorisations)
       .def_ro("directions", &StageEnd::directions)
       .def_ro("solved", &StageEnd::solved);
   nb::borrow<nb::class_<LocalEnergyModel>>(nb::type<LocalEnergyModel>())
-      .def("solve_stage", &solve_stage, "stage"_a, "factors"_a.none(), "bonds_of_factors"_a,
-           "renew"_a,
-           "Solve a Stage, with factors of an earlier one and the number of bonds at the point of\n"
-           "their Hessian; renew(x, strain) takes pairs that hold there. Returns a StageEnd.");
+      .def(
+          "solve_stage", &solve_stage, "stage"_a, "factors"_a.none(), "bonds_of_factors"_a,
+          "renew"_a, "kinks"_a = StageKinks{},
+          "Solve a Stage, with factors of an earlier one, the number of bonds at the point of\n"
+          "their Hessian, and the kinks on which it ended; renew(x, strain) takes pairs that hold\n"
+          "there. Returns a StageEnd.");
 }
 
 }  // namespace jamshape

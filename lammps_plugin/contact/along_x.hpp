@@ -90,7 +90,6 @@ template <class ShapeAlongX> struct AlongX {
     return norm_sq(shift) + norm_sq(turned) + 2.0 * std::abs(dot(shift, turned));
   }
 
- protected:
   /// Whether the gap between two bounding spheres is smaller than a margin.
   template <int D> static bool spheres_are_closer(double margin, const Body<D> &i, const Body<D> &j)
   {

@@ -100,13 +100,14 @@ template <class Model, int D, class S = double> using ContactOf = Contact<D, S, 
 
 /// The contacts of as many pairs as a pack has lanes, without bonds: energies and their derivatives
 /// of those that touch. A lane marked `alone` is of a rare kind and left to the code for single
-/// pairs; `shared` lanes, whose bonds share an energy, take longer and go into packs of their own.
+/// pairs; `further` lanes, which may have a second bond, take longer and go into packs of their
+/// own.
 template <int D, class S> struct ContactLanes {
   S energy{0.0};
   Vec<D, S> force{};
   Torque<D, S> torque_i{}, torque_j{};
   S bond_force{0.0};  // sum of the magnitudes
-  Truth<S> touching, alone{}, shared{}, two_bonds{};
+  Truth<S> touching, alone{}, further{}, two_bonds{};
 };
 
 /// Starting point of the search for a pair's next contact, remembered from the previous one: a

@@ -14,6 +14,7 @@ template <int D> struct ContactBlock {
   int n = 0, i[MOST], j[MOST];
   alignas(64) double separation[D][MOST];
   alignas(64) double k_e[MOST];
+  double margin = 0.0;  // added to the distances of first touch, where only `touching` is needed
 
   /// One bit per pair: whether it touches, whether it is also `alone`, of a rare kind left to the
   /// code for single pairs, and whether it has two bonds. The members below are set for pairs that
@@ -45,24 +46,21 @@ template <int D> struct ContactBlock {
     k_e[n] = stiffness;
   }
 
-  /// Finds the contacts of a shape without shared lanes.
-  template <class ContactsOf> void find(int lanes, const ContactsOf &contacts_of)
+  /// Finds the contacts in packs of this many lanes: `lanes_of(block, first)` returns the
+  /// ContactLanes of the pairs of a block from `first` on, and each of `further_of` those of the
+  /// pairs that the function before it left to it.
+  template <class LanesOf, class... FurtherOf>
+  void find(int lanes, const LanesOf &lanes_of, const FurtherOf &...further_of)
   {
-    set_all(lanes, contacts_of);
-  }
-
-  /// Finds them in packs of this many lanes: `contacts_of(block, first)` and `shared_of(block,
-  /// first)` return the ContactLanes of the pairs of a block from `first` on.
-  template <class ContactsOf, class SharedOf>
-  void find(int lanes, const ContactsOf &contacts_of, const SharedOf &shared_of)
-  {
-    const std::uint64_t shared = set_all(lanes, contacts_of);
-    if (shared == 0) return;
-    ContactBlock others;
-    for_each(shared, [&](int k) { others.add(i[k], j[k], separation_of(k), k_e[k]); });
-    others.set_all(lanes, shared_of);
-    int from = 0;
-    for_each(shared, [&](int k) { copy(k, others, from++); });
+    const std::uint64_t further = set_all(lanes, lanes_of);
+    if constexpr (sizeof...(FurtherOf) > 0) {
+      if (further == 0) return;
+      ContactBlock others;
+      for_each(further, [&](int k) { others.add(i[k], j[k], separation_of(k), k_e[k]); });
+      others.find(lanes, further_of...);
+      int from = 0;
+      for_each(further, [&](int k) { copy(k, others, from++); });
+    }
   }
 
   void set_start(int k, const Vec<D> &at)
@@ -84,20 +82,20 @@ template <int D> struct ContactBlock {
   }
 
  private:
-  /// Returns the shared pairs.
+  /// Returns the pairs left to a further function.
   template <class LanesOf> std::uint64_t set_all(int lanes, const LanesOf &lanes_of)
   {
     fill_up(lanes);
-    std::uint64_t shared = touching = alone = two_bonds = 0;
+    std::uint64_t further = touching = alone = two_bonds = 0;
     for (int first = 0; first < n; first += lanes) {
       const auto found = lanes_of(*this, first);
       set(first, found);
-      shared |= std::uint64_t{bits_of(found.shared)} << first;
+      further |= std::uint64_t{bits_of(found.further)} << first;
     }
     const std::uint64_t asked = ~std::uint64_t{0} >> (MOST - n);
     touching &= asked;
     alone &= asked;
-    return shared & asked;
+    return further & asked;
   }
 
   /// Repeats the last pair to fill the remaining lanes of a pack.

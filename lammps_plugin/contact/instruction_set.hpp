@@ -9,7 +9,7 @@
 namespace jamshape {
 
 /// Instruction sets that packs are compiled for; `scalar` uses no packs.
-enum class InstructionSet { scalar, baseline, avx2 };
+enum class InstructionSet { scalar, baseline, avx2, avx512 };
 
 struct NamedSet {
   InstructionSet set;
@@ -17,15 +17,19 @@ struct NamedSet {
 };
 inline constexpr NamedSet INSTRUCTION_SETS[] = {{InstructionSet::scalar, "scalar"},
                                                 {InstructionSet::baseline, "baseline"},
-                                                {InstructionSet::avx2, "avx2"}};
+                                                {InstructionSet::avx2, "avx2"},
+                                                {InstructionSet::avx512, "avx512"}};
 
 inline bool machine_has(InstructionSet set)
 {
 #if defined(__x86_64__)
   __builtin_cpu_init();
   if (set == InstructionSet::avx2) return __builtin_cpu_supports("avx2") != 0;
+  if (set == InstructionSet::avx512) {
+    return __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512dq") != 0;
+  }
 #endif
-  return set != InstructionSet::avx2;
+  return set != InstructionSet::avx2 && set != InstructionSet::avx512;
 }
 
 /// The set that the environment variable JAMSHAPE_SIMD names, or the best of this machine if it is
@@ -71,6 +75,9 @@ auto compiled_for(InstructionSet set, const OfSet &of_set)
 #if defined(__x86_64__)
   if (set == InstructionSet::avx2) {
     return of_set(std::integral_constant<InstructionSet, InstructionSet::avx2>());
+  }
+  if (set == InstructionSet::avx512) {
+    return of_set(std::integral_constant<InstructionSet, InstructionSet::avx512>());
   }
 #endif
   return of_set(std::integral_constant<InstructionSet, InstructionSet::baseline>());

@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <Eigen/Core>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -32,6 +33,55 @@ struct Coordinates {
 struct Displacement {
   const double *x;  // (n,) in the coordinates
   double strain;
+};
+
+/// A pair of particles whatever list it is in: both, and the cell vectors by which the second is
+/// shifted.
+using PairName = std::array<std::int64_t, 5>;
+
+/// The energy of a pair near a kink is the larger of two smooth pieces. On the kink it may be any
+/// mixture of both: (1 - weight) V_from + weight V_to, in which the state stays on the kink while
+/// it is held there. `hold_kinks` adds a stiffness across, along the difference of the gradients:
+/// (stiffness / 2) (V_to - V_from)^2.
+struct Kink {
+  PairName pair;
+  int from, to;
+  double weight, stiffness;
+  bool is_held;
+};
+
+/// A kink seen from a point: V_to - V_from there, and by these coordinates (-1 for none) the
+/// gradient of that difference, and of V_from minus the energy of the pair. It exists if the pair
+/// touches.
+struct KinkThere {
+  static constexpr int MOST = 12;
+  bool exists;
+  double gap;
+  std::array<std::int64_t, MOST> column;
+  std::array<double, MOST> jump, change;
+
+  /// Adds a multiple of a gradient to a vector (n,).
+  void add(double part, const std::array<double, MOST> &gradient, Eigen::VectorXd &to) const
+  {
+    for (int k = 0; k < MOST; ++k) {
+      if (column[k] >= 0) to[column[k]] += part * gradient[k];
+    }
+  }
+  /// Change of the difference by a displacement (n,).
+  double across(const Eigen::VectorXd &step) const
+  {
+    double sum = 0.0;
+    for (int k = 0; k < MOST; ++k) {
+      if (column[k] >= 0) sum += jump[k] * step[column[k]];
+    }
+    return sum;
+  }
+  double jump_squared() const
+  {
+    double sum = 0.0;
+    for (int k = 0; k < MOST; ++k) sum += column[k] >= 0 ? jump[k] * jump[k] : 0.0;
+    return sum;
+  }
 };
 
 /// Largest displacement and rotation of a particle in one step.
@@ -100,6 +150,16 @@ class LocalEnergyModel {
   virtual void share(std::size_t threads) = 0;
 
   virtual LandscapeSums evaluate(const Displacement &at, bool extended) const = 0;
+
+  /// Whether energies have kinks whose two smooth pieces are known.
+  virtual bool has_kinks() const = 0;
+  /// For each pair that may have a kink, the smooth piece on which it lies at a point.
+  virtual std::map<PairName, int> pieces(const Displacement &at) const = 0;
+  virtual std::vector<KinkThere> kinks_at(const Displacement &at, const std::vector<Kink> &kinks,
+                                          bool extended) const = 0;
+  /// Second derivatives are those of the mixtures on these kinks from now on.
+  virtual void hold_kinks(const std::vector<Kink> &kinks) = 0;
+
   /// At most 1: the fraction of a step (n,) that keeps every particle within its bounds of
   /// displacement and rotation.
   virtual double part_within(const double *step, const StepBounds &bounds) const = 0;
@@ -247,6 +307,34 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     return sums_of(sum_over(in_long, posed_at<long double>(pairs, at), nullptr, by), at);
   }
 
+  bool has_kinks() const override { return HAS_KINKS; }
+
+  std::map<PairName, int> pieces(const Displacement &at) const override
+  {
+    std::map<PairName, int> found;
+    if constexpr (HAS_KINKS) {
+      const Moved &posed = moved_to(at);
+      for (std::size_t p = 0; p < posed.size(); ++p) {
+        const Vec<D> r = posed.separation(p);
+        if (!posed.may_touch(p, r)) continue;
+        const int piece =
+            Model::template piece<D>(posed.first_body(p, r), posed.second_body(p), posed.law(p));
+        if (piece >= 0) found.emplace(name_of(p), piece);
+      }
+    }
+    return found;
+  }
+
+  std::vector<KinkThere> kinks_at(const Displacement &at, const std::vector<Kink> &kinks,
+                                  bool extended) const override
+  {
+    if (kinks.empty()) return {};
+    if (!extended) return kinks_in(moved_to(at), kinks);
+    return kinks_in(posed_at<long double>(pairs, at), kinks);
+  }
+
+  void hold_kinks(const std::vector<Kink> &kinks) override { held_kinks = kinks; }
+
   double part_within(const double *step, const StepBounds &bounds) const override
   {
     const Displacement by{step, 0.0};
@@ -336,6 +424,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   }
 
  private:
+  static constexpr bool HAS_KINKS = Model::template HAS_KINKS<D>;
   static constexpr int BLOCK = D + ROTATIONS<D>;
   static constexpr int VARIABLES = PAIR_VARIABLES<D>;
   static constexpr int TURNS = D == 2 ? 1 : 4;  // per orientation
@@ -391,6 +480,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   mutable std::vector<PairSums<D, double>> parts;  // work space
   std::unique_ptr<BlockSystem> systems[2];  // without fill-in and with it, once they are used
   BlockSystem *hessian = nullptr;           // the one last used
+  std::vector<Kink> held_kinks;
   Vec<D> strained = all_axes();
   Eigen::VectorXd pulled;  // by the strain of these axes
   double pulled_back = 0.0;
@@ -841,6 +931,90 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     return by + std::min(1.0, stiffest / largest) * turning;
   }
 
+  PairName name_of(std::size_t p) const
+  {
+    PairName name{};
+    std::copy_n(&pairs.particles[2 * p], 2, name.begin());
+    std::copy_n(&pairs.shift[D * p], D, name.begin() + 2);
+    return name;
+  }
+
+  /// The number of each of these pairs in the list, if it is there.
+  std::vector<std::optional<std::size_t>> numbers_of(const std::vector<Kink> &kinks) const
+  {
+    std::vector<std::optional<std::size_t>> found(kinks.size());
+    for (std::size_t p = 0; p < pairs.list().n; ++p) {
+      for (std::size_t k = 0; k < kinks.size(); ++k) {
+        if (pairs.particles[2 * p] == kinks[k].pair[0] && name_of(p) == kinks[k].pair) found[k] = p;
+      }
+    }
+    return found;
+  }
+
+  template <class Pairs>
+  std::vector<KinkThere> kinks_in(const Pairs &posed, const std::vector<Kink> &kinks) const
+  {
+    std::vector<KinkThere> found(kinks.size());
+    if constexpr (HAS_KINKS) {
+      const auto numbers = numbers_of(kinks);
+      for (std::size_t k = 0; k < kinks.size(); ++k) {
+        if (numbers[k]) found[k] = kink_in(posed, *numbers[k], kinks[k]);
+      }
+    }
+    return found;
+  }
+
+  template <class Pairs>
+  KinkThere kink_in(const Pairs &posed, std::size_t p, const Kink &kink) const
+  {
+    using S = typename Pairs::S;
+    const Vec<D, S> r = posed.separation(p);
+    const auto i = posed.first_body(p, r);
+    const auto &j = posed.second_body(p);
+    const auto whole = contact_of(i, j, posed.law(p));
+    KinkThere found{};
+    found.exists = whole.status == ContactStatus::TOUCHING;
+    if (!found.exists) return found;
+    const auto from = contact_of(i, j, Model::on_piece(posed.law(p), kink.from));
+    const auto to = contact_of(i, j, Model::on_piece(posed.law(p), kink.to));
+    found.gap = static_cast<double>(to.energy - from.energy);
+    found.column.fill(-1);
+    for (int side = 0; side < 2; ++side) {
+      const std::size_t particle = pairs.particles[2 * p + side];
+      const double scale = coordinates.radians_per_length[particle];
+      for (int k = 0; k < BLOCK; ++k) {
+        const int c = BLOCK * side + k;
+        found.column[c] = coordinates.column[BLOCK * particle + k];
+        const auto slope = [&](const auto &of) {
+          if (k < D) return side == 0 ? -of.force[k] : of.force[k];
+          return -scale * (side == 0 ? of.torque_i : of.torque_j)[k - D];
+        };
+        found.jump[c] = static_cast<double>(slope(to) - slope(from));
+        found.change[c] = static_cast<double>(slope(from) - slope(whole));
+      }
+    }
+    return found;
+  }
+
+  /// Second derivatives of the mixture on a kink, and its stiffness across.
+  PairMatrix by_variables_on(const Kink &kink, std::size_t p, const DualContact &from,
+                             const DualContact &to) const
+  {
+    PairMatrix by = PairMatrix::Zero();
+    PairRow jump = PairRow::Zero();
+    const auto add = [&](const DualContact &piece, double weight, double sign) {
+      if (piece.status != ContactStatus::TOUCHING) return;
+      by += weight * by_variables(p, piece);
+      constexpr int M = ROTATIONS<D>;
+      for (int k = 0; k < D; ++k) jump[k] -= sign * value_of(piece.force[k]);
+      for (int k = 0; k < M; ++k) jump[D + k] -= sign * value_of(piece.torque_i[k]);
+      for (int k = 0; k < M; ++k) jump[D + M + k] -= sign * value_of(piece.torque_j[k]);
+    };
+    add(from, 1.0 - kink.weight, -1.0);
+    add(to, kink.weight, 1.0);
+    return by + kink.stiffness * jump * jump.transpose();
+  }
+
   /// Factors that convert a pair's variables into lengths at its surfaces.
   PairRow per_length(std::size_t p) const
   {
@@ -863,6 +1037,13 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   void each_curved(const Moved &posed, const std::optional<TurnedBodies<Moved>> &turned_bodies,
                    const Range &part, const Then &then) const
   {
+    std::map<std::size_t, const Kink *> kink_of;
+    if constexpr (HAS_KINKS) {
+      const auto numbers = numbers_of(held_kinks);
+      for (std::size_t k = 0; k < numbers.size(); ++k) {
+        if (numbers[k]) kink_of[*numbers[k]] = &held_kinks[k];
+      }
+    }
     for (std::size_t p = part.first; p < part.last; ++p) {
       const Vec<D> r = posed.separation(p);
       Start start = remembers ? starts[p] : Start{};
@@ -871,7 +1052,14 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
       if (found.turns) {
         const DualContact dual = turned_bodies->contact(p, r, &start);
         if (dual.status != ContactStatus::TOUCHING) continue;
-        found.by = by_variables(p, dual);
+        const auto held = kink_of.find(p);
+        if (held == kink_of.end()) {
+          found.by = by_variables(p, dual);
+        } else if constexpr (HAS_KINKS) {
+          const Kink &kink = *held->second;
+          found.by = by_variables_on(kink, p, turned_bodies->contact_on(kink.from, p, r),
+                                     turned_bodies->contact_on(kink.to, p, r));
+        }
       } else {
         const ContactOf<Model, D> contact = contact_in(posed, p, r, &start);
         if (contact.status != ContactStatus::TOUCHING) continue;

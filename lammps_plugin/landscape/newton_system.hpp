@@ -15,9 +15,10 @@
 namespace jamshape {
 
 /// The equations of Newton's method at the base of a local energy model, (H + shift) x = right: the
-/// shift, kept from one base to the next, makes the Hessian H positive definite. Solved by factors
-/// where these are cheap, else by conjugate gradients preconditioned with incomplete ones (Nocedal
-/// & Wright, Numerical Optimization, Sec. 7.1).
+/// shift, kept from one base to the next, makes the Hessian H positive definite. Solved by complete
+/// factors where these are cheap, which serve as long as few contacts open or close, else by
+/// conjugate gradients preconditioned with incomplete ones (Nocedal & Wright, Numerical
+/// Optimization, Sec. 7.1).
 class NewtonSystem {
  public:
   using Vector = Eigen::VectorXd;
@@ -30,7 +31,8 @@ class NewtonSystem {
   double shift;
   int factorisations = 0, products = 0;
 
-  /// Takes the Hessian at the base; raises the shift until all pivots are positive.
+  /// Takes the Hessian at the base. Where it is factorised, raises the shift until all pivots are
+  /// positive.
   void prepare()
   {
     const Vector origin = Vector::Zero(static_cast<Eigen::Index>(about.n()));
@@ -40,13 +42,17 @@ class NewtonSystem {
       throw std::runtime_error("The Hessian has elements that are not finite.");
     scale = largest > 0.0 ? largest : 1.0;
     shift = std::max(shift, LEAST_SHIFT * scale);
-    factorise();
+    is_old = about.has_complete_factors() && factors && factors->size() == about.n() && !is_far;
+    if (!is_old) factorise();
   }
 
   /// Solves to a relative accuracy, used by iterations only.
   Vector solve(const Vector &right, double accuracy)
   {
-    if (about.has_complete_factors()) return factors->solve(right);
+    if (about.has_complete_factors()) {
+      if (is_old) factorise();
+      return factors->solve(right);
+    }
     while (true) {
       const Iterated found = iterate(right, accuracy * right.norm());
       if (found.is_solution) return found.x;
@@ -59,7 +65,14 @@ class NewtonSystem {
   /// the iterations met (Alg. 7.1 there).
   Vector direction(const Vector &gradient, double accuracy)
   {
-    if (about.has_complete_factors()) return -factors->solve(gradient);
+    if (about.has_complete_factors()) {
+      if (is_old) {
+        const Iterated found = with_old_factors(gradient, accuracy);
+        if (found.is_solution) return -found.x;
+        factorise();
+      }
+      return -factors->solve(gradient);
+    }
     return -iterate(gradient, accuracy * gradient.norm()).x;
   }
 
@@ -92,15 +105,22 @@ class NewtonSystem {
   /// A step that needed more evaluations of the line search had a wrong direction.
   static constexpr int FAR_OFF = 6;
 
+  /// Iterations with complete factors of an earlier base that take less time than new ones, and the
+  /// remainder of the solution over the accuracy of other iterations.
+  static constexpr int MOST_ITERATIONS = 10;
+  static constexpr double REMAINDER = 0.1;
+
   /// Smallest shift of incomplete factors, over the largest diagonal element, if pivots need one.
   static constexpr double INCOMPLETE = 1e-4;
 
   LocalEnergyModel &about;
   double scale = 1.0;
   std::shared_ptr<Factors> factors;
+  bool is_old = false, is_far = false;  // factors of an earlier base; too far from it
 
   void factorise()
   {
+    is_old = is_far = false;
     const bool complete = about.has_complete_factors();
     double added = shift;
     while (!(factors = factors_with(added))) {
@@ -128,6 +148,35 @@ class NewtonSystem {
     Vector found(static_cast<Eigen::Index>(about.n()));
     for (double &x : found) x = static_cast<double>(numbers() >> 11) * 0x1p-53 - 0.5;
     return found.normalized();
+  }
+
+  /// A solution by conjugate gradients preconditioned with complete factors of an earlier base,
+  /// from which the matrix differs by the few contacts that have opened or closed. No solution if
+  /// it differs too much; in the norm of the factors, as soft modes have small forces.
+  Iterated with_old_factors(const Vector &right, double accuracy)
+  {
+    Vector x = Vector::Zero(right.size());
+    Vector rest = right, preconditioned = factors->solve(rest), along = preconditioned;
+    double product = rest.dot(preconditioned);
+    const double enough = REMAINDER * REMAINDER * accuracy * accuracy * product;
+    for (int k = 0; k < MOST_ITERATIONS; ++k) {
+      const Vector pulled = about.times(along) + shift * along;
+      ++products;
+      const double curvature = along.dot(pulled);
+      if (!(curvature > 0.0)) break;
+      const double length = product / curvature;
+      x += length * along;
+      rest -= length * pulled;
+      preconditioned = factors->solve(rest);
+      const double next = rest.dot(preconditioned);
+      if (next <= enough) {
+        is_far = 2 * k > MOST_ITERATIONS;
+        return {x, along, true};
+      }
+      along = preconditioned + (next / product) * along;
+      product = next;
+    }
+    return {x, along, false};
   }
 
   /// Preconditioned conjugate gradients, which in exact arithmetic end after as many steps as there

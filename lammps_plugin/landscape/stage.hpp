@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <Eigen/Core>
 #include <functional>
+#include <iterator>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -31,6 +32,9 @@ struct StageUnits {
   double length;  // sqrt(overlap size)
   double n_particles;
 
+  /// Stiffness of a bond, at least.
+  double stiffness() const { return force * force * n_particles / energy; }
+
   /// Magnitude of a displacement (n,), from the force (n,) that causes it and the drag over the
   /// time step.
   template <class X, class F, class C>
@@ -49,10 +53,12 @@ struct StageLimits {
   StepBounds step;
 };
 
-/// Factors of the Hessian plus drag at a point, and the number of bonds there.
+/// Factors of the Hessian plus drag at a point, the number of bonds there, and the kinks on which
+/// the state was held.
 struct StageFactors {
   std::shared_ptr<Factors> factors;
   std::size_t n_bonds;
+  std::vector<Kink> kinks{};
 };
 
 /// Result of a stage; for rejected guesses `sums` holds the reason.
@@ -91,24 +97,35 @@ class StageSolver {
   StageEnd solve(const Vector &guess, const Vector &other, StageFactors earlier)
   {
     known = std::move(earlier);
+    held = known.kinks;
     Point at = begin(guess, other);
+    see_kinks(at);
     Vector before = Vector::Zero(guess.size());
-    for (; directions < DIRECTIONS && !at.sums.is_refused(); ++directions) {
+    for (; directions < most() && !at.sums.is_refused(); ++directions) {
       const Correction correction = correction_at(at);
       if (!known.factors || !correction.step.allFinite()) break;
       if (is_last(correction.size)) {
+        move_weights(correction, 1.0);
         at.x += correction.step;
         return end(std::move(at), true);
       }
       size_before = correction.size;
       const double part = about.part_within(correction.step.data(), limits.step);
       const Vector step = part * correction.step;
+      move_weights(correction, part);
+      const double down = pushed(at).dot(step);
       Point tried = point(at.x + step);
       if (!tried.sums.is_refused()) {
-        if (is_past_a_kink(at, tried, step, before, correction.size)) {
+        see_kinks(tried);
+        if (find_kinks(at, tried)) {
+          size_before = 0.0;
+        } else if (is_past_a_kink(at, tried, step, before, correction.size)) {
           tried = between(at, std::move(tried), limits.accuracy / correction.size);
-        } else if (tried.gradient.dot(step) > -at.gradient.dot(step)) {
-          tried = point(at.x + lowest(at, tried, step, part) * step);
+        } else if (const double up = pushed(tried).dot(step); up > -down) {
+          const double shorter =
+              kinks_held().empty() ? lowest(at, tried, step, part) : down / (down - up);
+          tried = point(at.x + shorter * step);
+          see_kinks(tried);
           size_before = 0.0;
         }
       }
@@ -125,6 +142,12 @@ class StageSolver {
 
   /// Directions that suffice for smooth stages; later steps are checked for kinks.
   static constexpr int SMOOTH = 3;
+  /// Kinks are released in this many turns.
+  static constexpr int RELEASES = 4;
+  /// Smallest jump of the slope on a kink, over a typical force.
+  static constexpr double LEAST_JUMP = 1e-9;
+  /// Stiffness across a kink, over that of a bond.
+  static constexpr double STIFF = 1e5;
   /// Fraction of the force along a step that has reversed if the step crossed a kink.
   static constexpr double OVERSHOT = 0.3;
   /// Tolerances within which such a step is near the solution.
@@ -143,15 +166,17 @@ class StageSolver {
   struct Point {
     Vector x;
     LandscapeSums sums;
-    Vector gradient;  // of the minimised function
+    Vector gradient;                 // of the minimised function
+    std::vector<KinkThere> kinks{};  // those held and released
   };
 
   struct Correction {
     Vector step;
     double size;
+    std::vector<double> weights{};  // changes of those of the kinks
   };
 
-  struct Kink {
+  struct Valley {
     Vector across, jump;
     double inverse;
   };
@@ -162,12 +187,17 @@ class StageSolver {
   const StageLimits &limits;
   Renew renew_pairs;
   StageFactors known;
-  std::vector<Kink> kinks;
+  std::vector<Valley> valleys;
+  std::vector<Kink> held;  // on which the state is held, or from which it was released to a side
   int evaluations = 0, factorisations = 0, directions = 0;
   double size_before = 0.0;  // of the last correction by these factors after a full step
 
-  StageEnd end(Point at, bool solved) const
+  /// Most directions: the kinks are known only after some.
+  int most() const { return held.empty() ? DIRECTIONS : 2 * DIRECTIONS; }
+
+  StageEnd end(Point at, bool solved)
   {
+    known.kinks = kinks_held();
     return {std::move(at.x), std::move(at.sums), known, evaluations,
             factorisations,  directions,         solved};
   }
@@ -196,17 +226,169 @@ class StageSolver {
     return first.sums.crossing >= 0 || collides ? point(other) : first;
   }
 
-  /// The correction by the present factors, as long as they serve.
+  /// The correction by the present factors, as long as they serve. Kinks that it would leave are
+  /// released, and the others corrected once more.
   Correction correction_at(const Point &at)
   {
-    if (known.factors) {
+    if (known.factors && hold_those_of_factors()) {
       Correction found = newton(at);
-      if (serve(at, found.size)) return found;
+      if (serve(at, found.size) && !release(found)) return found;
     }
+    for (int left = RELEASES; left >= 0; --left) {
+      Correction found = factorised(at);
+      if (!known.factors || !release(found) || left == 0) return found;
+    }
+    return {};
+  }
+
+  Correction factorised(const Point &at)
+  {
     size_before = 0.0;
-    known = {about.factorise({at.x.data(), 0.0}, stage.drag), at.sums.n_bonds};
+    each_held([&](std::size_t k) { held[k].stiffness = stiffness_across(at.kinks[k]); });
+    std::vector<Kink> kinks = kinks_held();
+    about.hold_kinks(kinks);
+    known = {about.factorise({at.x.data(), 0.0}, stage.drag), at.sums.n_bonds, std::move(kinks)};
+    about.hold_kinks({});
     ++factorisations;
     return known.factors ? newton(at) : Correction{};
+  }
+
+  /// Whether the factors are those of the kinks on which the state is held now.
+  bool hold_those_of_factors() const
+  {
+    std::size_t k = 0;
+    for (const Kink &kink : held) {
+      if (!kink.is_held) continue;
+      if (k == known.kinks.size()) return false;
+      const Kink &other = known.kinks[k++];
+      if (kink.pair != other.pair || kink.from != other.from || kink.to != other.to) return false;
+    }
+    return k == known.kinks.size();
+  }
+
+  /// Newton's step on the kinks, with the change of their weights: the solution of
+  ///     (H + drag) q + sum of dw J = -slope,   J.q - dw / stiffness = -gap,
+  /// J the jump across each kink (a proximal method of multipliers: Rockafellar, Math. Oper. Res.
+  /// 1, 97 (1976)). The factors include stiffness J J^T, as sparse as H, since a kink is of one
+  /// pair.
+  Correction newton_on_kinks(const Point &at) const
+  {
+    Vector pull = -slope(at);
+    Correction found{known.factors->solve(-pushed(at)), 0.0, std::vector<double>(held.size())};
+    each_held([&](std::size_t k) {
+      const KinkThere &there = at.kinks[k];
+      found.weights[k] = held[k].stiffness * (there.gap + there.across(found.step));
+      there.add(-found.weights[k], there.jump, pull);
+    });
+    found.size = units.size(found.step, pull, stage.drag);
+    return found;
+  }
+
+  std::vector<Kink> kinks_held() const
+  {
+    std::vector<Kink> kinks;
+    std::copy_if(held.begin(), held.end(), std::back_inserter(kinks),
+                 [](const Kink &kink) { return kink.is_held; });
+    return kinks;
+  }
+
+  double stiffness_across(const KinkThere &kink) const
+  {
+    const double least = LEAST_JUMP * units.force;
+    return STIFF * units.stiffness() / std::max(kink.jump_squared(), least * least);
+  }
+
+  template <class Then> void each_held(const Then &then) const
+  {
+    for (std::size_t k = 0; k < held.size(); ++k) {
+      if (held[k].is_held) then(k);
+    }
+  }
+
+  /// The gradient at a point with the mixtures on kinks.
+  Vector slope(const Point &at) const
+  {
+    Vector found = at.gradient;
+    for (std::size_t k = 0; k < held.size(); ++k) {
+      at.kinks[k].add(1.0, at.kinks[k].change, found);
+      at.kinks[k].add(held[k].weight, at.kinks[k].jump, found);
+    }
+    return found;
+  }
+
+  /// With the pull onto the kinks: what Newton's step makes zero.
+  Vector pushed(const Point &at) const
+  {
+    Vector found = slope(at);
+    each_held([&](std::size_t k) {
+      at.kinks[k].add(held[k].stiffness * at.kinks[k].gap, at.kinks[k].jump, found);
+    });
+    return found;
+  }
+
+  void move_weights(const Correction &by, double part)
+  {
+    each_held([&](std::size_t k) { held[k].weight += part * by.weights[k]; });
+  }
+
+  /// Releases kinks to whose sides a correction leads; whether there are any.
+  bool release(const Correction &by)
+  {
+    bool any = false;
+    for (std::size_t k = 0; k < held.size(); ++k) {
+      if (!held[k].is_held) continue;
+      const double weight = held[k].weight + by.weights[k];
+      if (weight >= 0.0 && weight <= 1.0) continue;
+      held[k].weight = weight < 0.0 ? 0.0 : 1.0;
+      held[k].is_held = false;
+      any = true;
+    }
+    return any;
+  }
+
+  /// Looks at the kinks from a point, and holds those that it is on the wrong side of.
+  void see_kinks(Point &at)
+  {
+    if (held.empty() || at.sums.is_refused()) return;
+    at.kinks = about.kinks_at({at.x.data(), 0.0}, held, stage.extended);
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < held.size(); ++k) {
+      const KinkThere &there = at.kinks[k];
+      if (!there.exists) continue;
+      if (!held[k].is_held && (held[k].weight < 0.5 ? there.gap > 0.0 : there.gap < 0.0))
+        held[k].is_held = true;
+      held[kept] = held[k];
+      at.kinks[kept++] = there;
+    }
+    held.resize(kept);
+    at.kinks.resize(kept);
+  }
+
+  /// Holds the kinks that lie between two points; whether there are new ones.
+  bool find_kinks(const Point &at, Point &tried)
+  {
+    if (!about.has_kinks() || directions < SMOOTH) return false;
+    const auto before = about.pieces({at.x.data(), 0.0}), now = about.pieces({tried.x.data(), 0.0});
+    std::vector<Kink> found;
+    for (const auto &[pair, piece] : now) {
+      const auto then = before.find(pair);
+      if (then == before.end() || then->second == piece) continue;
+      const auto is_same = [&name = pair](const Kink &kink) { return kink.pair == name; };
+      if (std::any_of(held.begin(), held.end(), is_same)) continue;
+      found.push_back({pair, then->second, piece, 0.5, 0.0, true});
+    }
+    const std::vector<KinkThere> there =
+        about.kinks_at({tried.x.data(), 0.0}, found, stage.extended);
+    bool any = false;
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      // Only the larger of two pieces holds a state, and only where the slope jumps.
+      const double jump = there[k].exists ? std::sqrt(there[k].jump_squared()) : 0.0;
+      if (!(jump > LEAST_JUMP * units.force) || there[k].gap < 0.0) continue;
+      held.push_back(found[k]);
+      tried.kinks.push_back(there[k]);
+      any = true;
+    }
+    return any;
   }
 
   /// Factors of an earlier stage make the first step if the number of bonds is the same.
@@ -219,15 +401,16 @@ class StageSolver {
   /// Newton's step, with BFGS updates for the kinks found.
   Correction newton(const Point &at) const
   {
+    if (!held.empty()) return newton_on_kinks(at);
     Vector q = -at.gradient;
-    std::vector<double> weights(kinks.size());
-    for (std::size_t k = kinks.size(); k-- > 0;) {
-      weights[k] = kinks[k].inverse * kinks[k].across.dot(q);
-      q -= weights[k] * kinks[k].jump;
+    std::vector<double> weights(valleys.size());
+    for (std::size_t k = valleys.size(); k-- > 0;) {
+      weights[k] = valleys[k].inverse * valleys[k].across.dot(q);
+      q -= weights[k] * valleys[k].jump;
     }
     q = known.factors->solve(q);
-    for (std::size_t k = 0; k < kinks.size(); ++k) {
-      q += (weights[k] - kinks[k].inverse * kinks[k].jump.dot(q)) * kinks[k].across;
+    for (std::size_t k = 0; k < valleys.size(); ++k) {
+      q += (weights[k] - valleys[k].inverse * valleys[k].jump.dot(q)) * valleys[k].across;
     }
     const double size = units.size(q, -at.gradient, stage.drag);
     return {std::move(q), size};
@@ -265,7 +448,7 @@ class StageSolver {
   bool is_past_a_kink(const Point &at, const Point &tried, const Vector &step, const Vector &before,
                       double size) const
   {
-    if (directions < SMOOTH) return false;
+    if (directions < SMOOTH || about.has_kinks()) return false;
     const bool overshot = tried.gradient.dot(step) > -OVERSHOT * at.gradient.dot(step);
     const bool turns_round = step.dot(before) < -BACK * step.norm() * before.norm();
     return overshot && (size <= NEAR * limits.accuracy || turns_round);
@@ -282,11 +465,11 @@ class StageSolver {
       if (middle.sums.is_refused()) return middle;
       (middle.gradient.dot(way) > 0.0 ? high : low) = std::move(middle);
     }
-    Kink kink{high.x - low.x, high.gradient - low.gradient, 0.0};
-    const double here = low.gradient.dot(kink.across), there = high.gradient.dot(kink.across);
-    kink.inverse = 1.0 / (there - here);
-    high.gradient = kink.inverse * (there * low.gradient - here * high.gradient);
-    kinks.push_back(std::move(kink));
+    Valley valley{high.x - low.x, high.gradient - low.gradient, 0.0};
+    const double here = low.gradient.dot(valley.across), there = high.gradient.dot(valley.across);
+    valley.inverse = 1.0 / (there - here);
+    high.gradient = valley.inverse * (there * low.gradient - here * high.gradient);
+    valleys.push_back(std::move(valley));
     return high;
   }
 };

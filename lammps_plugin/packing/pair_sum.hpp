@@ -303,6 +303,15 @@ template <class Pairs> class TurnedBodies {
     return to_its_digits(pairs, p, found);
   }
 
+  /// The same on one smooth piece of the energy.
+  ContactOf<Model, D, Dual<PAIR_VARIABLES<D>, S>> contact_on(int piece, std::size_t p,
+                                                             const Vec<D, S> &r) const
+  {
+    auto body_i = as_i[pairs.first(p)];
+    body_i.centre = as_variables<D, S>(r);
+    return contact_of(body_i, as_j[pairs.second(p)], Model::on_piece(pairs.law(p), piece));
+  }
+
  private:
   const Pairs &pairs;
   std::vector<typename Model::template Body<D, Dual<PAIR_VARIABLES<D>, S>>> as_i, as_j;

@@ -33,6 +33,7 @@ template <class Model, int D> class StoredBodies {
     explicit Block(const StoredBodies &of) : bodies(of.now.data()) {}
     void clear() {}
     int put(int i) { return i; }
+    int put_owner(int i) { return i; }
     int particle(int k) const { return k; }
     const Body *data() const { return bodies; }
 
@@ -99,6 +100,13 @@ template <class Model, int D> class AssembledBodies {
     {
       put_together.clear();
       particles.clear();
+      at_owner = -1;
+    }
+    /// The body of a pair's owner, which may be that of the pair before.
+    int put_owner(int i)
+    {
+      if (at_owner < 0 || particles[at_owner] != i) at_owner = put(i);
+      return at_owner;
     }
     int put(int i)
     {
@@ -113,6 +121,7 @@ template <class Model, int D> class AssembledBodies {
     const AssembledBodies &bodies;
     std::vector<Body> put_together;
     std::vector<int> particles;
+    int at_owner = -1;
   };
 
   void begin_shapes(std::size_t n)

@@ -275,7 +275,8 @@ struct OverdampedFlow::Weights {
 
 /// Displacement in coordinates of the box of strain 0 and rotation vector.
 template <int D>
-RateIn<D> OverdampedFlow::sum_of(const Row<D> &of, const Weights &m, RateIn<D> present) const
+[[gnu::always_inline]] inline RateIn<D> OverdampedFlow::sum_of(const Row<D> &of, const Weights &m,
+                                                               RateIn<D> present) const
 {
   const RateIn<D> stored = of.stored_rate();
   RateIn<D> sum{m.stored * stored.shift, m.stored * stored.turn};
@@ -294,7 +295,8 @@ RateIn<D> OverdampedFlow::sum_of(const Row<D> &of, const Weights &m, RateIn<D> p
 }
 
 template <int D>
-void OverdampedFlow::require_small(int i, const RateIn<D> &moved, const Upper &deformation)
+[[gnu::always_inline]] inline void OverdampedFlow::require_small(int i, const RateIn<D> &moved,
+                                                                 const Upper &deformation)
 {
   const Mobilities::Mobility &of = mobilities[i];
   const double limit = step_limit(of);
@@ -305,10 +307,14 @@ void OverdampedFlow::require_small(int i, const RateIn<D> &moved, const Upper &d
     return;
   }
   const double distance_sq = norm_sq(deformation * moved.shift);
-  if (distance_sq <= limit * limit) return;  // not for NaN
+  if (!(distance_sq <= limit * limit)) stop_at_long_step(i, std::sqrt(distance_sq));
+}
+
+void OverdampedFlow::stop_at_long_step(int i, double distance) const
+{
   refuse(lmp, FLERR,
          "fix overdamped/affine found that one step moves atom " + std::to_string(atom->tag[i]) +
-             " by " + shown(std::sqrt(distance_sq)) +
+             " by " + shown(distance) +
              ", expected at most half its radius: use a smaller timestep.");
 }
 

@@ -170,6 +170,7 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   template <int D> RateIn<D> sum_of(const Row<D> &row, const Weights &of, RateIn<D> present) const;
   template <int D> double length_of(int i, const RateIn<D> &of, const Upper &deformation) const;
   template <int D> void require_small(int i, const RateIn<D> &moved, const Upper &deformation);
+  [[noreturn]] void stop_at_long_step(int i, double distance) const;
   /// Additional work of a pass over the particles beside moving them.
   enum class Pass { MOVE, START, FINISH };
   template <int D> void move_in(const Move &move, Pass pass);

@@ -92,15 +92,14 @@ template <class Model> class PairContactOf : public PairContact {
   bool has_current_contacts() const override
   {
     const std::size_t known = domain->dimension == 2 ? in_2d.now.size() : in_3d.now.size();
-    return !first.empty() && chosen_at == neighbor->lastcall &&
-           known == static_cast<std::size_t>(n_all()) &&
-           first.size() == static_cast<std::size_t>(list->inum) + 1;
+    return chosen_at == neighbor->lastcall && chosen_of == list->inum &&
+           known == static_cast<std::size_t>(n_all());
   }
 
   double memory_usage() override
   {
     return PairContact::memory_usage() + in_2d.memory_usage() + in_3d.memory_usage() +
-           static_cast<double>((first.capacity() + partner.capacity()) * sizeof(int) +
+           static_cast<double>((owner.capacity() + partner.capacity()) * sizeof(int) +
                                last_normal.capacity() * sizeof(float));
   }
 
@@ -193,10 +192,11 @@ template <class Model> class PairContactOf : public PairContact {
   Bodies<3> in_3d;
   double margin = 0.0, n_listed = 0.0;
   LAMMPS_NS::bigint chosen_at = -1;  // step of the list that pairs were chosen from
+  int chosen_of = -1;                // length of that list
   double shapes_read = -1.0;         // when the run began in which shapes were last read
   std::uint64_t shapes = 0;          // their checksum
   bool packs_take_all = false;
-  std::vector<int> first, partner;  // close pairs: partners of the n-th atom of LAMMPS's list
+  std::vector<int> owner, partner;  // close pairs of an own atom, in order, and another one
   std::vector<float> last_normal;   // D per close pair, if contacts start from it; zeros at first
 
   template <int D> Bodies<D> &all()
@@ -224,37 +224,49 @@ template <class Model> class PairContactOf : public PairContact {
   template <int D, bool TURNS, bool TALLY> void evaluate()
   {
     if constexpr (PacksOf<Model, D>::EXIST) {
-      FindContacts<Model, D> *const find = PacksOf<Model, D>::of(instructions);
-      if (find != nullptr && packs_take_all) return evaluate_blocks<D, TURNS, TALLY>(*find);
+      if (auto *const find = finder<D>()) return evaluate_blocks<D, TURNS, TALLY>(*find);
     }
     evaluate_pairs<D, TURNS, TALLY>();
+  }
+
+  /// The function that finds contacts in packs; null if they are evaluated pair by pair.
+  template <int D> FindContacts<Model, D> *finder() const
+  {
+    if constexpr (PacksOf<Model, D>::EXIST) {
+      if (packs_take_all) return PacksOf<Model, D>::of(instructions);
+    }
+    return nullptr;
   }
 
   /// Evaluates pairs in packs.
   template <int D, bool TURNS, bool TALLY> void evaluate_blocks(FindContacts<Model, D> &find)
   {
-    const int *const type = atom->type;
     ContactBlock<D> block;
     typename BodiesOf<Model, D>::Block bodies(all<D>().now);
-    int next = 0;  // pair of the list that is not yet in a block
-    for (int n = 0; n < list->inum; ++n) {
-      const int i = list->ilist[n];
-      for (int k = first[n], at_i = -1; k < first[n + 1]; ++k) {
-        const int j = partner[k];
-        if (at_i < 0) at_i = bodies.put(i);
-        const int at_j = bodies.put(j);
-        const Vec<D> r = bodies.data()[at_i].centre - bodies.data()[at_j].centre;
-        block.add(at_i, at_j, r, k_e[type[i]][type[j]]);
-        if (block.n < block.MOST) continue;
-        add_block<D, TURNS, TALLY>(find, bodies, block, next);
-        next = k + 1;
-        at_i = -1;
-      }
+    for (int begin = 0; begin < n_close(); begin += block.MOST) {
+      fill<D>(block, bodies, begin, std::min(begin + block.MOST, n_close()));
+      add_block<D, TURNS, TALLY>(find, bodies, block, begin);
     }
-    if (block.n > 0) add_block<D, TURNS, TALLY>(find, bodies, block, next);
   }
 
-  /// Adds the contacts of a block, the first of which is of this pair of the list, and empties it.
+  int n_close() const { return static_cast<int>(partner.size()); }
+
+  /// Fills a block with close pairs begin to end - 1.
+  template <int D, class InBlock>
+  void fill(ContactBlock<D> &block, InBlock &bodies, int begin, int end) const
+  {
+    const int *const type = atom->type;
+    block.n = 0;
+    bodies.clear();
+    for (int k = begin; k < end; ++k) {
+      const int i = owner[k], j = partner[k];
+      const int at_i = bodies.put_owner(i), at_j = bodies.put(j);
+      const Vec<D> r = bodies.data()[at_i].centre - bodies.data()[at_j].centre;
+      block.add(at_i, at_j, r, k_e[type[i]][type[j]]);
+    }
+  }
+
+  /// Adds the contacts of a block, the first of which is of this close pair.
   template <int D, bool TURNS, bool TALLY, class InBlock>
   void add_block(FindContacts<Model, D> &find, InBlock &bodies, ContactBlock<D> &block, int pair)
   {
@@ -269,8 +281,6 @@ template <class Model> class PairContactOf : public PairContact {
           {block.energy[k], block.force_of(k), block.torque_i_of(k), block.torque_j_of(k)});
     });
     block.for_each(block.alone, [&](int k) { add_alone<D, TURNS, TALLY>(pair + k, i(k), j(k)); });
-    block.n = 0;
-    bodies.clear();
   }
 
   /// Sets the starts of the contacts of a block, if they use normals.
@@ -334,12 +344,12 @@ template <class Model> class PairContactOf : public PairContact {
     const BodiesOf<Model, D> &bodies = all<D>().now;
     const int nlocal = atom->nlocal, newton = force->newton_pair;
     double **const f = atom->f, **const torque = atom->torque;
-    for (int n = 0; n < list->inum; ++n) {
-      const int i = list->ilist[n];
+    for (int k = 0; k < n_close();) {
+      const int i = owner[k];
       const Body<D> body = bodies[i];
       Vec<D> force_i{};
       Torque<D> torque_i{};
-      for (int k = first[n]; k < first[n + 1]; ++k) {
+      for (; k < n_close() && owner[k] == i; ++k) {
         const int j = partner[k];
         const Body<D> &other = bodies[j];
         const Touch<D> contact = contact_of_pair<D>(k, {i, j}, body, other);
@@ -502,24 +512,10 @@ template <class Model> class PairContactOf : public PairContact {
     Bodies<D> &bodies = all<D>();
     require_numbers(atom->nlocal);
     if (D == 2 && any_turns) require_in_plane(atom->nlocal);
-    first.assign(1, 0);
-    partner.clear();
-    n_listed = 0.0;
-    for (int n = 0; n < list->inum; ++n) {
-      const int i = list->ilist[n];
-      const Body<D> &body = bodies.now[i];
-      const int *const neighbours = list->firstneigh[i];
-      for (int k = 0; k < list->numneigh[i]; ++k) {
-        const int j = neighbours[k] & NEIGHMASK;
-        if ((disabled.pairs || Model::template closer_than<D>(margin, body, bodies.now[j])) &&
-            has_full_weight(i, neighbours[k])) {
-          partner.push_back(j);
-        }
-      }
-      n_listed += list->numneigh[i];
-      first.push_back(static_cast<int>(partner.size()));
+    list_close<D>();
+    for (std::vector<int> *const each : {&owner, &partner}) {
+      if (each->capacity() > each->size() + each->size() / 4) each->shrink_to_fit();
     }
-    if (partner.capacity() > partner.size() + partner.size() / 4) partner.shrink_to_fit();
     if (StartsFromNormal<D>::value && any_turns) {
       last_normal.clear();
       resize_closely(last_normal, D * partner.size());
@@ -529,6 +525,63 @@ template <class Model> class PairContactOf : public PairContact {
     for (std::size_t i = 0; i < bodies.then.size(); ++i) bodies.then[i] = bodies.now.pose(i);
     bodies.cell_then = cell();
     chosen_at = neighbor->lastcall;
+    chosen_of = list->inum;
+  }
+
+  /// Lists the pairs whose surfaces are closer than the margin.
+  template <int D> void list_close()
+  {
+    const BodiesOf<Model, D> &bodies = all<D>().now;
+    FindContacts<Model, D> *const find = finder<D>();
+    const bool in_packs = PacksOf<Model, D>::CHOOSE && find != nullptr && !disabled.pairs;
+    owner.clear();
+    partner.clear();
+    n_listed = 0.0;
+    int n_chosen = 0;  // from here on pairs are candidates
+    for (int n = 0; n < list->inum; ++n) {
+      const int i = list->ilist[n];
+      const Body<D> &body = bodies[i];
+      const int *const neighbours = list->firstneigh[i];
+      for (int k = 0; k < list->numneigh[i]; ++k) {
+        const int j = neighbours[k] & NEIGHMASK;
+        if (!is_candidate<D>(in_packs, body, bodies[j]) || !has_full_weight(i, neighbours[k]))
+          continue;
+        owner.push_back(i);
+        partner.push_back(j);
+        if (in_packs && n_close() - n_chosen == ContactBlock<D>::MOST)
+          n_chosen = choose_from<D>(*find, n_chosen);
+      }
+      n_listed += list->numneigh[i];
+    }
+    if (in_packs && n_close() > n_chosen) choose_from<D>(*find, n_chosen);
+  }
+
+  /// Whether a pair is close, or may be so where packs choose.
+  template <int D> bool is_candidate(bool in_packs, const Body<D> &i, const Body<D> &j) const
+  {
+    if constexpr (PacksOf<Model, D>::CHOOSE) {
+      if (in_packs) return Model::template spheres_are_closer<D>(margin, i, j);
+    }
+    return disabled.pairs || Model::template closer_than<D>(margin, i, j);
+  }
+
+  /// Removes the pairs from `begin` on that are not close, at most a block of them. Returns the
+  /// number of pairs left.
+  template <int D> int choose_from(FindContacts<Model, D> &find, int begin)
+  {
+    ContactBlock<D> block;
+    typename BodiesOf<Model, D>::Block bodies(all<D>().now);
+    fill<D>(block, bodies, begin, n_close());
+    block.margin = margin;
+    find(bodies.data(), Model::law(1.0, Sides::ONE), block);
+    int n_chosen = begin;
+    block.for_each(block.touching, [&](int k) {
+      owner[n_chosen] = owner[begin + k];
+      partner[n_chosen++] = partner[begin + k];
+    });
+    owner.resize(n_chosen);
+    partner.resize(n_chosen);
+    return n_chosen;
   }
 
   /// Whether two particles may have approached by the margin, or a pose is NaN: their own motion on
@@ -564,10 +617,10 @@ template <class Model> class PairContactOf : public PairContact {
   {
     read_poses<D>();
     const BodiesOf<Model, D> &bodies = all<D>().now;
-    for (int n = 0; n < list->inum; ++n) {
-      const int i = list->ilist[n];
+    for (int k = 0; k < n_close();) {
+      const int i = owner[k];
       const Body<D> body = bodies[i];
-      for (int k = first[n]; k < first[n + 1]; ++k) {
+      for (; k < n_close() && owner[k] == i; ++k) {
         const int j = partner[k];
         const Body<D> &other = bodies[j];
         const Touch<D> contact = contact_of_pair<D>(k, {i, j}, body, other);
@@ -587,16 +640,13 @@ template <class Model> class PairContactOf : public PairContact {
   template <int D> void visit_curvatures(const std::function<void(const LocalCurvature &)> &visit)
   {
     std::vector<double> triangle;
-    for (int n = 0; n < list->inum; ++n) {
-      const int i = list->ilist[n];
-      for (int k = first[n]; k < first[n + 1]; ++k) {
-        const int j = partner[k];
-        const ContactDerivatives<Model, D, double> found =
-            derivatives_at<Model, D>(posed_pair<D>(i, j));
-        if (found.contact.status != ContactStatus::TOUCHING) continue;
-        fill_triangle<D>(found, triangle);
-        visit({i, j, triangle});
-      }
+    for (int k = 0; k < n_close(); ++k) {
+      const int i = owner[k], j = partner[k];
+      const ContactDerivatives<Model, D, double> found =
+          derivatives_at<Model, D>(posed_pair<D>(i, j));
+      if (found.contact.status != ContactStatus::TOUCHING) continue;
+      fill_triangle<D>(found, triangle);
+      visit({i, j, triangle});
     }
   }
 

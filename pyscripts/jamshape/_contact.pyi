@@ -167,11 +167,18 @@ class Stage:
         other: _Reals,
     ) -> None: ...
 
+class StageKinks:
+    particles: list[tuple[int, int]]
+    weights: list[float]
+    def __init__(self) -> None: ...
+    def __len__(self) -> int: ...
+
 class StageEnd:
     x: _Reals
     sums: _Sums
     factors: Factors | None
     bonds_of_factors: int
+    kinks: StageKinks
     evaluations: int
     factorisations: int
     directions: int
@@ -233,7 +240,12 @@ class LocalEnergyModel:
     def part_within(self, x: _Reals, longest_step: float, widest_turn: float) -> float: ...
     def factorise(self, x: _Reals, strain: float, diagonal: _Reals) -> Factors: ...
     def solve_stage(
-        self, stage: Stage, factors: Factors | None, bonds_of_factors: int, renew: _Renew
+        self,
+        stage: Stage,
+        factors: Factors | None,
+        bonds_of_factors: int,
+        renew: _Renew,
+        kinks: StageKinks = ...,
     ) -> StageEnd: ...
     def descend(
         self,

@@ -13,7 +13,7 @@ from jamshape import _contact
 
 HERE = Path(__file__).parent
 SOURCES = HERE.parents[1] / "lammps_plugin"
-FLAGS = {"baseline": [], "avx2": ["-mavx2"]}
+FLAGS = {"baseline": [], "avx2": ["-mavx2"], "avx512": ["-mavx512f", "-mavx512dq"]}
 COMPILER = shutil.which("g++")
 
 

@@ -67,7 +67,7 @@ def test_parameters_make_particles_that_fit_and_come_back(case):
     assert SHAPES[guess_shape_style(diameters)].fits(diameters)
     shape.check_form(form, case.dimension)
     assert "$" in shape.label(parameters)
-    assert all(math.isfinite(value) for value in shape.described(diameters, form).values())
+    assert all(math.isfinite(value) for value in shape.described(diameters, form, case.dimension).values())
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -156,6 +156,35 @@ def test_outlines_have_the_area_and_the_moment_of_the_particle(case, measured):
     # The area between an arc and its chord falls as the square of its length.
     assert np.max(off[0]) < 0.03
     assert np.max(off[1]) < np.max(off[0]) / 4
+
+
+def is_there_and_back(ends, k):
+    """Whether a step of an outline is also taken the other way round."""
+    back = np.abs(ends[::-1] - ends[:, k : k + 1]).max(axis=(0, 2))
+    return bool((back < 1e-9).any())
+
+
+@pytest.mark.parametrize("case", [c for c in PURE if c.dimension == 2], ids=str)
+def test_perimeter_and_asphericity_are_those_of_the_outline(case, measured):
+    sizes, bodies = lone(case)
+    shape, body = SHAPES[case.shape], (sizes.diameters[1], sizes.form[1])
+    length, off = shape.perimeter(*body), []
+    for points in (400, 1600):
+        outline = shape.outline(*body, points)
+        chords = np.linalg.norm(np.roll(outline, -1, axis=0) - outline, axis=1)
+        # Long ones are straight sides, or lead from one closed curve to another and back.
+        ends = np.stack([outline, np.roll(outline, -1, axis=0)])
+        bridge = np.array([is_there_and_back(ends, k) for k in range(len(outline))])
+        off.append(1 - chords[~bridge].sum() / length)
+    measured(perimeter=off[1])
+    # Chords are shorter than arcs, by the square of their length.
+    assert 0 <= off[1] < 1e-4
+    assert off[1] <= off[0] / 8 + 1e-14
+    found = shape.described(sizes.diameters[1:], sizes.form[1:], 2)["asphericity"]
+    assert found == close_to(length**2 / (4 * math.pi * bodies.measure[1]), 1e-14)
+    assert found >= 1 - 1e-14  # the isoperimetric inequality
+    is_disc = bodies.rotation_length[1] == 0
+    assert (found == close_to(1.0, 1e-12)) == is_disc
 
 
 def volume_and_moments(mesh):

@@ -151,6 +151,7 @@ struct ClumpModel {
   /// Whether each bond constrains like a contact of its own, as of dimers.
   static constexpr bool BONDS_ARE_CONTACTS = true;
   static constexpr int OVERLAP_POWER = 1;
+  template <int D> static constexpr bool HAS_KINKS = false;
 
   static Law law(double k_e, Sides, bool /*shortcuts*/ = true) { return {{k_e}}; }
 

@@ -88,6 +88,7 @@ struct DimerModel : AlongX<Dimer> {
   static constexpr const char *CORE = "centres";
   static constexpr int MOST_BONDS = 4;
   static constexpr bool HAS_SIDES = false;
+  template <int D> static constexpr bool HAS_KINKS = false;
   /// Each pair of discs constrains like a contact of its own, whatever other bonds the dimers
   /// share.
   static constexpr bool BONDS_ARE_CONTACTS = true;

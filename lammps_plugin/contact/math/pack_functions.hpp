@@ -13,12 +13,17 @@ inline namespace JAMSHAPE_SET {
 inline constexpr double LN2 = 0x1.62e42fep-1, LN2_REST = 0x1.f473de6af278fp-30;
 inline constexpr double PER_LN2 = 0x1.71547652b82fep+0;
 
-/// c[0] + c[1] x + ... + c[N - 1] x^(N - 1).
+/// c[0] + c[1] x + ... + c[N - 1] x^(N - 1), even and odd powers apart, as two chains of operations
+/// at the same time.
 template <int N> Pack polynomial(const double (&c)[N], const Pack &x)
 {
-  Pack sum = c[N - 1];
-  for (int k = N - 2; k >= 0; --k) sum = sum * x + c[k];
-  return sum;
+  const Pack square = x * x;
+  Pack sum[2] = {c[N - 2], c[N - 1]};
+  for (int k = N - 3; k >= 0; k -= 2) {
+    sum[1] = sum[1] * square + c[k];
+    if (k > 0) sum[0] = sum[0] * square + c[k - 1];
+  }
+  return N % 2 == 0 ? sum[0] + x * sum[1] : sum[1] + x * sum[0];
 }
 
 /// exp(k ln 2 + r), |r| < ln 2 / 2, by the Taylor series of exp(r). Returns 0 below the smallest

@@ -26,6 +26,16 @@ template <class S> QuaternionOf<S> normalized(const QuaternionOf<S> &q)
   return {inverse * q.w, inverse * q.i, inverse * q.j, inverse * q.k};
 }
 
+/// The same for a quaternion whose length is off by rounding: its series needs neither a root nor a
+/// division.
+template <class S> QuaternionOf<S> renormalized(const QuaternionOf<S> &q)
+{
+  const S excess = q.w * q.w + q.i * q.i + q.j * q.j + q.k * q.k - 1.0;
+  if (!(abs(excess) < 1e-8)) return normalized(q);
+  const S inverse = 1.0 - excess * (0.5 - 0.375 * excess);
+  return {inverse * q.w, inverse * q.i, inverse * q.j, inverse * q.k};
+}
+
 /// Body axis `b` (0, 1, 2 for x, y, z) in space coordinates.
 template <class S> Vec<3, S> body_axis(const QuaternionOf<S> &q, int b)
 {
@@ -62,8 +72,8 @@ template <class S> CosSin<S> cos_sin(S x)
 {
   if (!std::is_same_v<S, double> || std::abs(x) > 0.01) return {std::cos(x), std::sin(x)};
   const S y = x * x;
-  return {1.0 - y / 2.0 * (1.0 - y / 12.0 * (1.0 - y / 30.0)),
-          x * (1.0 - y / 6.0 * (1.0 - y / 20.0 * (1.0 - y / 42.0)))};
+  return {1.0 - y * (1.0 / 2 - y * (1.0 / 24 - y * (1.0 / 720))),
+          x * (1.0 - y * (1.0 / 6 - y * (1.0 / 120 - y * (1.0 / 5040))))};
 }
 
 /// Rotation by the angle |v| about v, in space coordinates.
@@ -84,7 +94,15 @@ template <class S> QuaternionOf<S> rotation_by(const Vec<1, S> &v)
 template <int M, class S> QuaternionOf<S> turned(const QuaternionOf<S> &q, const Vec<M, S> &v)
 {
   if (norm_sq(v) == 0.0) return q;
-  return normalized(rotation_by(v) * q);
+  return renormalized(rotation_by(v) * q);
+}
+/// In the plane, where q is a rotation about z.
+template <class S> QuaternionOf<S> turned(const QuaternionOf<S> &q, const Vec<1, S> &v)
+{
+  if (v[0] == 0.0) return q;
+  const CosSin<S> half = cos_sin(S(0.5) * v[0]);
+  return renormalized(QuaternionOf<S>{half.cosine * q.w - half.sine * q.k, S(0.0), S(0.0),
+                                      half.cosine * q.k + half.sine * q.w});
 }
 
 /// Inverse of rotation_by: the rotation vector of `q`, of length at most pi.

@@ -77,6 +77,8 @@ template <int D, class S> [[gnu::always_inline]] inline S norm(const Vec<D, S> &
   return sqrt(norm_sq(a));
 }
 
+template <class S> [[gnu::always_inline]] inline S norm(const Vec<1, S> &a) { return abs(a[0]); }
+
 /// Component by component.
 template <int D, class S>
 [[gnu::always_inline]] inline Vec<D, ValueOf<S>> values_of(const Vec<D, S> &a)

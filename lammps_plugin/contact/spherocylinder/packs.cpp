@@ -9,12 +9,25 @@
 namespace jamshape {
 namespace {
 
-template <int D> Vec<D, Pack> axes(const SpherocylinderBody<D> *bodies, const int *index)
-{
-  Vec<D, Pack> u;
-  for (int a = 0; a < D; ++a) u[a] = Pack::from([&](int k) { return bodies[index[k]].axis[a]; });
-  return u;
-}
+/// Axes, half lengths and radii of the bodies of a pack.
+template <int D> struct BodiesOfPack {
+  Vec<D, Pack> axis;
+  Pack half_length, radius;
+
+  BodiesOfPack(const SpherocylinderBody<D> *bodies, const int *index)
+  {
+    using Body = SpherocylinderBody<D>;
+    static_assert(offsetof(Body, half_length) == offsetof(Body, axis) + sizeof(Body::axis));
+    static_assert(offsetof(Body, radius) == offsetof(Body, half_length) + sizeof(double));
+    Pack last[4];
+    load_fours([&](int k) { return bodies[index[k]].axis.c + (D - 2); }, last);
+    axis[D - 2] = last[0];
+    axis[D - 1] = last[1];
+    half_length = last[2];
+    radius = last[3];
+    if constexpr (D == 3) axis[0] = Pack::from([&](int k) { return bodies[index[k]].axis[0]; });
+  }
+};
 
 /// The pairs of a block from `first` on.
 template <int D>
@@ -22,22 +35,12 @@ SpherocylinderContact<D, Pack> pairs_of(const SpherocylinderBody<D> *bodies,
                                         const SpherocylinderLaw &law, const ContactBlock<D> &block,
                                         int first)
 {
-  const int *const i = block.i + first, *const j = block.j + first;
-  const auto A = [&](const int *index) {
-    return Pack::from([&](int k) { return bodies[index[k]].half_length; });
-  };
-  const auto R = [&](const int *index) {
-    return Pack::from([&](int k) { return bodies[index[k]].radius; });
-  };
-  SpinePair<D, Pack> pair{{}, {}, A(i), {}, A(j)};
-  if (!law.shortcuts || any((pair.A_i > Pack(0.0)) | (pair.A_j > Pack(0.0)))) {
-    pair.u_i = axes<D>(bodies, i);
-    pair.u_j = axes<D>(bodies, j);
-  }
+  const BodiesOfPack<D> i(bodies, block.i + first), j(bodies, block.j + first);
+  SpinePair<D, Pack> pair{{}, i.axis, i.half_length, j.axis, j.half_length};
   for (int a = 0; a < D; ++a) pair.r[a] = Pack::load(block.separation[a] + first);
   const SpherocylinderLawOf<Pack> of_lanes{
       {Pack::load(block.k_e + first)}, law.sides, law.shortcuts};
-  return {pair, R(i), R(j), of_lanes};
+  return {pair, i.radius, j.radius + block.margin, of_lanes};
 }
 
 }  // namespace
@@ -52,6 +55,9 @@ template <InstructionSet SET, int D>
       LANES,
       [&](const ContactBlock<D> &of, int first) {
         return pairs_of<D>(bodies, law, of, first).evaluate_lanes();
+      },
+      [&](const ContactBlock<D> &of, int first) {
+        return pairs_of<D>(bodies, law, of, first).evaluate_far_lanes();
       },
       [&](const ContactBlock<D> &of, int first) {
         return pairs_of<D>(bodies, law, of, first).evaluate_shared_lanes();

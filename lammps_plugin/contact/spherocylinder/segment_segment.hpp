@@ -124,6 +124,9 @@ template <int D, class S> struct TipFeet {
   }
 };
 
+/// No number of a tip.
+inline constexpr int NO_TIP = -1;
+
 /// Whether feet `a` are closer than `b`, each a tip and its foot on the other spine. If they share
 /// a tip, the one whose other foot lies inside the spine is closer: it is the nearest point to that
 /// tip. Rounded distances cannot distinguish feet within 1e-8 of each other, which would leave
@@ -144,10 +147,11 @@ Truth<S> is_closer(const SpinePair<D, S> &p, const Feet<D, S> &a, const Feet<D, 
 template <int D, class S> struct EndFeet {
   Feet<D, S> plus, minus;
 
-  explicit EndFeet(const SpinePair<D, S> &p)
+  /// A tip (numbered as in `TipFeet`) may be given as the one of the farther end.
+  explicit EndFeet(const SpinePair<D, S> &p, int far_tip = NO_TIP)
   {
     if constexpr (std::is_same_v<Truth<S>, bool>) {
-      find_by_tip(p);
+      find_by_tip(p, far_tip);
     } else {
       find_in_lanes(p);
     }
@@ -155,6 +159,7 @@ template <int D, class S> struct EndFeet {
 
   Feet<D, S> nearer() const { return chosen(minus_is_nearer, minus, plus); }
   Feet<D, S> farther() const { return chosen(minus_is_nearer, plus, minus); }
+  int tip_of_farther() const { return minus_is_nearer ? plus_tip : minus_tip; }
 
   /// Whether the two ends are different points.
   bool are_apart() const { return plus.s != minus.s || plus.t != minus.t; }
@@ -167,8 +172,9 @@ template <int D, class S> struct EndFeet {
 
  private:
   Truth<S> minus_is_nearer;
+  int plus_tip = NO_TIP, minus_tip = NO_TIP;
 
-  void find_by_tip(const SpinePair<D, S> &p)
+  void find_by_tip(const SpinePair<D, S> &p, int far_tip)
   {
     const auto &values = values_of(p);
     const TipFeet<D, ValueOf<S>> tips(values);
@@ -181,8 +187,15 @@ template <int D, class S> struct EndFeet {
       const AtTip at_a{a, tips.feet(values, a)}, at_b{b, tips.feet(values, b)};
       return is_closer(values, at_b.feet, at_a.feet) ? at_b : at_a;
     };
-    const AtTip at_plus = closer(0, j_plus), at_minus = closer(1, j_minus);
-    minus_is_nearer = is_closer(values, at_minus.feet, at_plus.feet);
+    const bool plus_is_far = far_tip == 0 || far_tip == j_plus;
+    const bool minus_is_far = far_tip != NO_TIP && !plus_is_far;
+    const int i_at_plus = plus_is_far ? far_tip : 0, i_at_minus = minus_is_far ? far_tip : 1;
+    const AtTip at_plus = closer(i_at_plus, plus_is_far ? far_tip : j_plus);
+    const AtTip at_minus = closer(i_at_minus, minus_is_far ? far_tip : j_minus);
+    minus_is_nearer =
+        far_tip == NO_TIP ? is_closer(values, at_minus.feet, at_plus.feet) : plus_is_far;
+    plus_tip = at_plus.tip;
+    minus_tip = at_minus.tip;
     if constexpr (std::is_same_v<S, ValueOf<S>>) {
       plus = at_plus.feet;
       minus = at_minus.feet;

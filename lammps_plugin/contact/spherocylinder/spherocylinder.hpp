@@ -59,6 +59,9 @@ template <class K> struct SpherocylinderLawOf {
   HarmonicOf<K> harmonic;
   Sides sides;
   bool shortcuts;  // false: also discs by the search for feet
+  /// In 2D a tip, as numbered by `TipFeet`: the farther end of two bonds, or the single bond, is
+  /// there, although another one may be closer. Then the energy has no kink.
+  int tip = NO_TIP;
 };
 using SpherocylinderLaw = SpherocylinderLawOf<double>;
 
@@ -116,6 +119,7 @@ template <int D, class S> class SpherocylinderContact {
     const auto closest = closest_feet(values);
     if (!touches(closest.distance_sq)) return without(ContactStatus::APART);
     if (is_coincident(closest) || spines_cross(values)) return without(ContactStatus::CROSSING);
+    if (law.tip != NO_TIP) return law.sides == Sides::TWO ? two_bonds() : bond_at_tip();
     if (law.sides == Sides::TWO && far_ends_may_touch(values, closest, reach)) return two_bonds();
     if constexpr (std::is_same_v<S, ValueOf<S>>) {
       return one_bond(closest);
@@ -124,7 +128,35 @@ template <int D, class S> class SpherocylinderContact {
     }
   }
 
-  /// Evaluates lanes all of which were found to be `shared`.
+  /// The tip where the farther end of two bonds is, or the single one of rods with sides one.
+  int tip() const
+  {
+    if (pair.A_i == 0.0 && pair.A_j == 0.0) return NO_TIP;
+    const auto closest = closest_feet(pair);
+    if (!touches(closest.distance_sq) || is_coincident(closest) || spines_cross(pair))
+      return NO_TIP;
+    if (law.sides == Sides::ONE) return TipFeet<D, S>(pair).nearest();
+    if (!far_ends_may_touch(pair, closest, reach)) return NO_TIP;
+    const EndFeet<D, S> ends(pair);
+    return touches(ends.farther().distance_sq) ? ends.tip_of_farther() : NO_TIP;
+  }
+
+  /// Evaluates lanes that `evaluate_lanes` left, which may have a second bond: two full ones or
+  /// one. Those that share an energy are left to `evaluate_shared_lanes`.
+  ContactLanes<D, S> evaluate_far_lanes() const
+  {
+    const EndFeet<D, S> ends(pair);
+    const Feet<D, S> closest = closest_to_end(pair, ends.nearer()), far_end = ends.farther();
+    ContactLanes<D, S> lanes;
+    lanes.touching = touches(closest.distance_sq);
+    const S distance = sqrt(closest.distance_sq);
+    const Truth<S> far = lanes.touching & touches(far_end.distance_sq);
+    if (any(far)) add_far_ends(lanes, far, distance, far_end);
+    lanes.bond_force += add_load(lanes, closest, distance, whole()).size;
+    return lanes;
+  }
+
+  /// Evaluates lanes that `evaluate_far_lanes` left.
   ContactLanes<D, S> evaluate_shared_lanes() const
   {
     const EndFeet<D, S> ends(pair);
@@ -143,11 +175,11 @@ template <int D, class S> class SpherocylinderContact {
     return lanes;
   }
 
-  /// Evaluates all lanes of a pack except the rare ones.
+  /// Evaluates lanes with one bond, except the rare ones.
   ContactLanes<D, S> evaluate_lanes() const
   {
     const Truth<S> round = (pair.A_i == S(0.0)) & (pair.A_j == S(0.0));
-    Feet<D, S> closest =
+    const Feet<D, S> closest =
         law.shortcuts && all(round) ? feet_at(pair, S(0.0), S(0.0)) : closest_feet(pair);
     ContactLanes<D, S> lanes;
     lanes.touching = touches(closest.distance_sq);
@@ -155,7 +187,10 @@ template <int D, class S> class SpherocylinderContact {
     lanes.alone = is_coincident(closest) | spines_cross(pair);
     if (law.sides == Sides::ONE) lanes.alone = lanes.alone | (is_parallel() & !round);
     lanes.alone = lanes.touching & lanes.alone;
-    if (law.sides == Sides::TWO) add_far_ends(lanes, closest);
+    if (law.sides == Sides::TWO) {
+      lanes.further =
+          lanes.touching & !(lanes.alone | round) & far_ends_may_touch(pair, closest, reach);
+    }
     lanes.bond_force += add_load(lanes, closest, sqrt(closest.distance_sq), whole()).size;
     return lanes;
   }
@@ -221,11 +256,21 @@ template <int D, class S> class SpherocylinderContact {
     return contact;
   }
 
+  Found bond_at_tip() const
+  {
+    const Feet<D, S> feet = TipFeet<D, ValueOf<S>>(values_of(pair)).feet(pair, law.tip);
+    if (!touches(feet.distance_sq)) return without(ContactStatus::APART);
+    Found contact = without(ContactStatus::TOUCHING);
+    contact.kind = kind_of(pair, feet);
+    add_bond(contact, feet, sqrt(feet.distance_sq), whole());
+    return contact;
+  }
+
   S overlap_at(const S &distance) const { return (reach - distance) * inverse_reach; }
 
   Found two_bonds() const
   {
-    const EndFeet<D, S> ends(pair);
+    const EndFeet<D, S> ends(pair, law.tip);
     const Feet<D, S> closest = closest_to_end(pair, ends.nearer());  // never the farther, at a tie
     const Feet<D, S> &far_end = ends.farther();
     const S distance = sqrt(closest.distance_sq);
@@ -307,20 +352,14 @@ template <int D, class S> class SpherocylinderContact {
     return contact;
   }
 
-  /// Adds the second bond of lanes with two full bonds.
-  void add_far_ends(ContactLanes<D, S> &lanes, Feet<D, S> &closest) const
+  /// Adds the second bond of lanes with two full bonds to those whose far ends touch.
+  void add_far_ends(ContactLanes<D, S> &lanes, const Truth<S> &far, const S &distance,
+                    const Feet<D, S> &far_end) const
   {
-    const Truth<S> opposite = lanes.touching & far_ends_may_touch(pair, closest, reach);
-    if (!any(opposite)) return;
-    const EndFeet<D, S> ends(pair);
-    closest = chosen(opposite, closest_to_end(pair, ends.nearer()), closest);
-    const Feet<D, S> far_end = ends.farther();
-    const Truth<S> far = opposite & touches(far_end.distance_sq);
-    if (!any(far)) return;
-    const S distance = sqrt(closest.distance_sq), far_distance = sqrt(far_end.distance_sq);
+    const S far_distance = sqrt(far_end.distance_sq);
     const SideBySide<S> at(pair, overlap_at(0.5 * (distance + far_distance)), reach);
     lanes.two_bonds = far & at.has_two_bonds();
-    lanes.shared = far & !lanes.two_bonds & !at.has_one_bond() & !lanes.alone;
+    lanes.further = far & !lanes.two_bonds & !at.has_one_bond();
     const S distance_of_second = select(lanes.two_bonds, far_distance, S(reach));
     lanes.bond_force += add_load(lanes, far_end, distance_of_second, whole()).size;
   }
@@ -406,6 +445,21 @@ struct SpherocylinderModel : AlongX<Spherocylinder> {
   }
   static double k_e(const Law &law) { return law.harmonic.k_e; }
 
+  /// In 2D the energy of a pair is the largest of several smooth pieces near its kinks, one for
+  /// each tip. The number of the one that it lies on; -1 without a contact that may have a kink.
+  template <int D> static constexpr bool HAS_KINKS = D == 2;
+  template <int D> static int piece(const Body<D> &i, const Body<D> &j, const Law &law)
+  {
+    return SpherocylinderContact<D, double>(i, j, law).tip();
+  }
+  /// The law of one of these pieces.
+  static Law on_piece(const Law &law, int piece)
+  {
+    Law of_piece = law;
+    of_piece.tip = piece;
+    return of_piece;
+  }
+
   /// Class of shapes whose contacts have a closed form.
   template <int D> static Shortcut shortcut(const Shape &shape)
   {
@@ -440,7 +494,7 @@ struct SpherocylinderModel : AlongX<Spherocylinder> {
 template <InstructionSet SET, int D> FindContacts<SpherocylinderModel, D> find_rod_contacts;
 
 template <int D> struct PacksOf<SpherocylinderModel, D> {
-  static constexpr bool EXIST = true;
+  static constexpr bool EXIST = true, CHOOSE = true;
   static bool take(const Spherocylinder &, const Spherocylinder &) { return true; }
 
   static FindContacts<SpherocylinderModel, D> *of(InstructionSet set)

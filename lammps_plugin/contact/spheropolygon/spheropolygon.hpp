@@ -63,16 +63,23 @@ SpinePair<D, S> sides_of(const SpheropolygonBody<D, S> &i, int a, const Spheropo
 
 /// The sides of one body that come closer to the other core's bounding circle than `reach`.
 template <int D, class T> struct FacingSides {
+  struct Spine {
+    int side;
+    Vec<D, T> middle, along;  // from the centre of the body; unit
+    T half_length;
+  };
   int n = 0;
-  std::array<int, MOST_CORNERS> which;
+  std::array<Spine, MOST_CORNERS> spine;
 
   FacingSides(const SpheropolygonBody<D, T> &of, const SpheropolygonBody<D, T> &other, T reach)
   {
+    const Vec<D, T> away = other.centre - of.centre;
     reach += other.core_radius();
     for (int k = 0; k < of.n(); ++k) {
-      const Vec<D, T> away = other.centre - of.centre - of.middle(k), along = of.along(k);
-      const T foot = limited(dot(away, along), of.half_length(k));
-      if (norm_sq(away - foot * along) < reach * reach) which[n++] = k;
+      const Spine one{k, of.middle(k), of.along(k), of.half_length(k)};
+      const Vec<D, T> from = away - one.middle;
+      const Vec<D, T> off = from - limited(dot(from, one.along), one.half_length) * one.along;
+      if (norm_sq(off) < reach * reach) spine[n++] = one;
     }
   }
 };
@@ -89,29 +96,46 @@ bool holds_centre(const SpheropolygonBody<D, T> &of, const SpheropolygonBody<D, 
   return of.n() > 1;
 }
 
-/// Calls `visit` with each two sides that face each other and are closer than `reach`, and their
-/// spines, until it returns false. Returns false if cores overlap.
+/// Calls `visit` with each two sides that face each other and may be closer than `reach`, and their
+/// spines, until it returns false. Returns false if the centre of one body lies in the other's core.
 template <int D, class T, class Visit>
 bool each_two_sides(const SpheropolygonBody<D, T> &i, const SpheropolygonBody<D, T> &j, T reach,
                     const Visit &visit)
 {
   const T bounding = i.core_radius() + j.core_radius() + reach;
-  if (!(norm_sq(i.centre - j.centre) < bounding * bounding)) return true;
-  if (holds_centre(i, j) || holds_centre(j, i)) return false;
+  const Vec<D, T> r = i.centre - j.centre;
+  if (!(norm_sq(r) < bounding * bounding)) return true;
   const FacingSides<D, T> of_i(i, j, reach);
-  if (of_i.n == 0) return true;
   const FacingSides<D, T> of_j(j, i, reach);
   for (int m = 0; m < of_i.n; ++m) {
+    const auto &one = of_i.spine[m];
     for (int n = 0; n < of_j.n; ++n) {
-      const int a = of_i.which[m], b = of_j.which[n];
-      const SpinePair<D, T> spines = sides_of(i, a, j, b);
-      const T near = reach + spines.A_i + spines.A_j;
-      if (!(norm_sq(spines.r) < near * near)) continue;
-      if (spines_cross(spines)) return false;
-      if (!visit(a, b, spines)) return true;
+      const auto &two = of_j.spine[n];
+      const Vec<D, T> apart = r + one.middle - two.middle;
+      const T near = reach + one.half_length + two.half_length;
+      if (!(norm_sq(apart) < near * near)) continue;
+      const SpinePair<D, T> spines{apart, one.along, one.half_length, two.along, two.half_length};
+      if (!visit(one.side, two.side, spines)) return true;
     }
   }
-  return true;
+  return !holds_centre(i, j) && !holds_centre(j, i);
+}
+
+/// A contact of two sides, of arms about their middles, as one about the centres of the bodies, given
+/// the vectors from there to the middles.
+template <int D, class S>
+Contact<D, S, 2> about_centres(Contact<D, S, 2> contact, const Vec<D, S> &to_i,
+                               const Vec<D, S> &to_j)
+{
+  contact.torque_i += cross(to_i, contact.force);
+  contact.torque_j -= cross(to_j, contact.force);
+  for (int b = 0; b < contact.n_bonds; ++b) {
+    Bond<D, S> &bond = contact.bond[b];
+    bond.arm_i += to_i;
+    bond.lever_i += cross(to_i, bond.normal);
+    bond.lever_j -= cross(to_j, bond.normal);
+  }
+  return contact;
 }
 
 /// Contact of two rounded polygons: that of the two of their sides with the largest energy, each
@@ -123,37 +147,30 @@ Contact<D, S, 2> contact_of(const SpheropolygonBody<D, S> &i, const Spheropolygo
                             const SpherocylinderLaw &law)
 {
   using T = ValueOf<S>;
-  struct Best {
-    int a = -1, b = -1;
-    T energy{-1.0};
-  } best;
-  bool is_crossing = false;
-  const double reach = i.radius() + j.radius();
-  const bool is_clear = each_two_sides<D, T>(
-      values_of(i), values_of(j), reach, [&](int a, int b, const SpinePair<D, T> &spines) {
-        const Contact<D, T, 2> found =
-            SpherocylinderContact<D, T>(spines, i.radius(), j.radius(), law).evaluate();
-        is_crossing = is_crossing || found.status == ContactStatus::CROSSING;
-        if (found.status == ContactStatus::TOUCHING && found.energy > best.energy)
-          best = {a, b, found.energy};
-        return !is_crossing;
-      });
-  if (is_crossing || !is_clear) return without_bonds<D, S, 2>(ContactStatus::CROSSING);
-  if (best.a < 0) return without_bonds<D, S, 2>(ContactStatus::APART);
-  Contact<D, S, 2> contact =
-      SpherocylinderContact<D, S>(sides_of(i, best.a, j, best.b), i.radius(), j.radius(), law)
-          .evaluate();
-  // From the middles of the sides to the centres of the bodies.
-  const Vec<D, S> to_i = i.middle(best.a), to_j = j.middle(best.b);
-  contact.torque_i += cross(to_i, contact.force);
-  contact.torque_j -= cross(to_j, contact.force);
-  for (int b = 0; b < contact.n_bonds; ++b) {
-    Bond<D, S> &bond = contact.bond[b];
-    bond.arm_i += to_i;
-    bond.lever_i += cross(to_i, bond.normal);
-    bond.lever_j -= cross(to_j, bond.normal);
+  const double R_i = i.radius(), R_j = j.radius();
+  auto best = without_bonds<D, T, 2>(ContactStatus::APART);
+  int side_i = 0, side_j = 0;
+  const auto compare = [&](int a, int b, const SpinePair<D, T> &spines) {
+    const Contact<D, T, 2> found = SpherocylinderContact<D, T>(spines, R_i, R_j, law).evaluate();
+    if (found.status == ContactStatus::CROSSING) {
+      best = found;
+      return false;
+    }
+    if (!(found.energy > best.energy)) return true;
+    best = found;
+    side_i = a;
+    side_j = b;
+    return true;
+  };
+  const bool is_clear = each_two_sides<D, T>(values_of(i), values_of(j), R_i + R_j, compare);
+  if (!is_clear) return without_bonds<D, S, 2>(ContactStatus::CROSSING);
+  if (best.status != ContactStatus::TOUCHING) return without_bonds<D, S, 2>(best.status);
+  if constexpr (std::is_same_v<S, T>) {
+    return about_centres(best, i.middle(side_i), j.middle(side_j));
+  } else {
+    const SpherocylinderContact<D, S> there(sides_of(i, side_i, j, side_j), R_i, R_j, law);
+    return about_centres(there.evaluate(), i.middle(side_i), j.middle(side_j));
   }
-  return contact;
 }
 
 /// Interface of a shape (see SpherocylinderModel).
@@ -177,6 +194,7 @@ struct SpheropolygonModel {
   static constexpr bool HAS_SIDES = true;
   static constexpr bool BONDS_ARE_CONTACTS = false;
   static constexpr int OVERLAP_POWER = 1;
+  template <int D> static constexpr bool HAS_KINKS = false;
 
   static Law law(double k_e, Sides sides, bool shortcuts = true)
   {

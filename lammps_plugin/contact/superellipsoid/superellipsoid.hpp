@@ -191,6 +191,7 @@ struct SuperellipsoidModel {
   static constexpr const char *CORE = "centres";
   static constexpr int MOST_BONDS = 1;
   static constexpr bool HAS_SIDES = false;
+  template <int D> static constexpr bool HAS_KINKS = false;
   static constexpr bool BONDS_ARE_CONTACTS = false;
   static constexpr int OVERLAP_POWER = 2;
 
@@ -322,7 +323,7 @@ template <InstructionSet SET, int D>
 FindContacts<SuperellipsoidModel, D> find_superellipsoid_contacts;
 
 template <int D> struct PacksOf<SuperellipsoidModel, D> {
-  static constexpr bool EXIST = true;
+  static constexpr bool EXIST = true, CHOOSE = false;
   static bool take(const Superellipsoid &shape, const Superellipsoid &first)
   {
     return shape.p == first.p;

@@ -30,6 +30,7 @@ from jamshape.landscape.local_energy_model import (
     Solution,
     Stage,
     StageFactors,
+    StageKinks,
     Units,
 )
 
@@ -243,6 +244,8 @@ class Flow:
     """Whether velocities are extrapolated, as the acceleration predicted the last one."""
     _factors: StageFactors | None = field(default=None, repr=False)
     _dt_of_factors: float = 0.0
+    _kinks: StageKinks = field(default_factory=StageKinks, repr=False)
+    """Kinks on which the last step ended."""
     _border: Border | None = field(default=None, repr=False)
     """Border of these factors, of a box that yields."""
     _here: Evaluation | None = field(default=None, repr=False)
@@ -252,7 +255,7 @@ class Flow:
     def forget(self) -> None:
         """Drop cached data, so that the continuation depends only on the public fields."""
         self._factors, self._here, self._is_fresh = None, None, True
-        self._border = None
+        self._border, self._kinks = None, StageKinks()
 
 
 class Step(NamedTuple):
@@ -423,6 +426,7 @@ class ImplicitFlow:
         self.columns = [_as_slice(landscape.column[:, k]) for k in range(self.dimension)]
         self.orientation = flow.state.orientation.astype(np.float64)
         self._crossing: CrossingError | None = None
+        self._kinks = flow._kinks
 
     @property
     def phi(self) -> float:
@@ -453,6 +457,7 @@ class ImplicitFlow:
             flow.state = flow.state.with_least_tilt()
             self.local_model.move_to(flow.state)
             self.local_model.forget_pairs()
+            self._kinks = flow._kinks
             flow._is_fresh = False
         self.local_model.hold()
         self.orientation = flow.state.orientation.astype(np.float64)
@@ -481,6 +486,8 @@ class ImplicitFlow:
         clipped = dt >= 0.999 * longest
         dt = longest if clipped else dt
         explicit = flow.explicit_left > 0 or dt < self._stable
+        if len(self._kinks) and dt > _LEAST_STEP * self._stable:
+            explicit = False  # which would go from one side of a kink to the other
         if explicit:
             dt, clipped = min(dt, self._stable), False
         return _Trial(dt, clipped, explicit)
@@ -653,6 +660,7 @@ class ImplicitFlow:
         accuracy = _STAGE_ACCURACY * self.protocol.tolerance
         if not 1 / _SAME_STEP < dt / max(flow._dt_of_factors, 1e-300) < _SAME_STEP:
             flow._factors = None
+        self._kinks = flow._kinks
         path = _Path(self, [dt * part for part in method.times])
         how = _Accuracy(units, accuracy, unit / self.size, self._is_extended(unit))
         evaluation, last = here, self.still
@@ -729,9 +737,11 @@ class ImplicitFlow:
     def _in_box(self, stage: Stage, how: _Accuracy, path: _Path) -> Solution:
         """Solve a stage in the box of a path; keep its factors."""
         flow = self.flow
-        found = self.local_model.solve(stage, flow._factors, how.units, how.tolerance)
+        found = self.local_model.solve(
+            stage, flow._factors or self._kinks, how.units, how.tolerance
+        )
         flow.factorisations += found.factorisations
-        flow._factors = found.factors
+        flow._factors, self._kinks = found.factors, found.kinks
         if self.box and found.factorisations and found.factors:
             volume = path.growth * flow.state.volume
             flow._border = self.box.border(
@@ -778,6 +788,7 @@ class ImplicitFlow:
             path.go_to_stage()
         self.local_model.move(attempt.x, 0.0)
         flow.state, flow._here = self.local_model.base, attempt.evaluation
+        flow._kinks = self._kinks
         # Velocities jump when contacts open or close: extrapolation is then less accurate.
         jump = path.velocities[-1] - begun
         missed = np.linalg.norm(jump - dt * acceleration)

@@ -44,13 +44,16 @@ _ARGUMENTS = {"strain_end": "strain", "phi_sheared": "phi", "tolerance": "integr
 
 
 def plan(
-    start: Callable[[], Packing], course: Protocol | SlowShear, made_from: Mapping[str, Any]
+    start: Callable[[], Packing],
+    course: Protocol | SlowShear,
+    made_from: Mapping[str, Any],
+    sides: int = 2,
 ) -> Plan:
-    """Plan a compression or a shear; the start has two bonds side to side from then on."""
+    """Plan a compression or a shear; the start has this many bonds side to side from then on."""
 
     def begin() -> ImplicitDriver:
         first = start()
-        first = first.with_(law=first.law.but(sides=2), step=0, time=0.0)
+        first = first.with_(law=first.law.but(sides=sides), step=0, time=0.0)
         return ImplicitDriver(first, course, Flow(State.of(first)))
 
     def restore(first: Packing, checkpoint: Checkpoint) -> ImplicitDriver:
@@ -62,7 +65,7 @@ def plan(
     is_shear = isinstance(course, SlowShear)
     name = "shear" if is_shear else "compression"
     arguments = _ARGUMENTS | ({"method": "integrator"} if is_shear else {})
-    told = _as_attributes(course) | dict(made_from)
+    told = _as_attributes(course) | dict(made_from) | ({"sides": sides} if sides != 2 else {})
     told["largest_strain"] = told.pop("largest_strain")  # may follow from the others
     return Plan(f"slow {name}", f"a {name}", told, begin, restore, arguments)
 

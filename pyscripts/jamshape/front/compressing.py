@@ -27,7 +27,7 @@ from jamshape.front.progress import place
 from jamshape.front.reading import Held
 from jamshape.front.recorded import recorded
 from jamshape.front.run import RunFile
-from jamshape.front.starts import Asked, Start
+from jamshape.front.starts import Asked, Start, require_known_kinks
 from jamshape.old_names import accepts_old
 from jamshape.packing import Packing
 from jamshape.protocols.approach import compressed_start
@@ -184,6 +184,7 @@ def slow_compress(
     method: str = "tr-bdf2",
     integration_tolerance: float = 1e-3,
     largest_drop: float = math.inf,
+    sides: int = 2,
     file: str | Path | None = None,
     again: bool = False,
     seconds: float | None = None,
@@ -217,6 +218,8 @@ def slow_compress(
         Local error of a step over the typical overlap.
     largest_drop : float
         Fraction of the elastic energy that one step may lose, so that plastic events are resolved in time.
+    sides : int
+        Bonds of a side-to-side contact of rods, 1 or 2; one in 2D only.
     file, again, seconds, progress
         See `compress`.
 
@@ -259,7 +262,9 @@ def slow_compress(
     for _, rate in protocol.rates:
         require_stated(kappa=rate)
     at = place(file, "slow.h5")
-    of = _start_of(particles, start, phi=(phi_start, phi_end), n=n, seed=seed, dimension=dimension)
+    sizes = {"n": n, "seed": seed, "dimension": dimension}
+    of = _start_of(particles, start, phi=(phi_start, phi_end), sides=sides, **sizes)
+    require_known_kinks(sides, of.dimension)
 
     def first() -> Packing:
         # Random insertion of bodies in space may end far below that of rods in the plane.
@@ -268,7 +273,7 @@ def slow_compress(
         _require_end_ahead(packing, protocol)
         return packing
 
-    plan = implicit_driver.plan(first, protocol, of.made_from | {"dimension": of.dimension})
+    plan = implicit_driver.plan(first, protocol, of.made_from | {"dimension": of.dimension}, sides)
     recorded(at.path, plan, again=again, seconds=seconds, progress=progress)
     return RunFile(*at)
 
@@ -277,6 +282,7 @@ def _start_of(
     particles: Particles | None,
     start: Held | None,
     phi: tuple[float | None, float],
+    sides: int,
     **sizes: int | None,
 ) -> Start:
     """Return the start of a slow compression; refuse a packing fraction that differs from that of a given one."""
@@ -288,7 +294,7 @@ def _start_of(
         require_in("phi_start", phi_start, _HANDED_OVER if dimension == 2 else RANGES["phi_start"])
         require_rising(phi_start, phi_end)
         return Start.of(particles, Asked(phi=phi_start, **sizes), None, usual_phi=phi_start)
-    of = Start.of(particles, Asked(phi=None, **sizes), start, usual_phi=phi_end)
+    of = Start.of(particles, Asked(phi=None, **sizes), start, usual_phi=phi_end, sides=sides)
     if (
         of.known
         and phi_start is not None

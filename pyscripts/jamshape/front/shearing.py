@@ -26,7 +26,7 @@ from jamshape.front.progress import place
 from jamshape.front.reading import Held
 from jamshape.front.recorded import recorded
 from jamshape.front.run import CyclicShearFile, QuasistaticShearFile, ShearFile
-from jamshape.front.starts import Asked, Start
+from jamshape.front.starts import Asked, Start, require_known_kinks
 from jamshape.landscape import Landscape, State
 from jamshape.old_names import accepts_old
 from jamshape.packing import Packing
@@ -153,9 +153,9 @@ def shear(
         most = min(SlowShear.largest_strain, strain / rows)
         error = integration_tolerance or _IMPLICIT_ERROR
         slow = SlowShear(gdot, strain, flow, error, largest_strain=most, method=integrator, **held)
-        _require_two_bonds(sides)
+        require_known_kinks(sides, of.dimension)
         made_from = of.made_from | {"rows": rows, "dimension": of.dimension}
-        plan = implicit_driver.plan(lambda: _flowing(of), slow, made_from)
+        plan = implicit_driver.plan(lambda: _flowing(of), slow, made_from, sides)
     else:
         settings = Shear(
             gdot=gdot, strain_end=strain, flow=flow, dt=min(0.05, 0.01 / gdot) if dt is None else dt,
@@ -455,13 +455,3 @@ def _require_cycle(amplitude: float, period: float, rows: int) -> None:
     if rows % QUARTERS:
         said = "{rows} samples in a cycle miss the largest strain, expected a multiple of 4"
         raise ArgumentError(said, {"rows": rows})
-
-
-def _require_two_bonds(sides: int) -> None:
-    """Refuse the law on whose kinks implicit steps would end."""
-    if sides != 2:
-        msg = (
-            f"implicit steps were requested with {sides} bonds side to side, expected 2; choose another"
-            " integrator"
-        )
-        raise ValueError(msg)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jamshape.checks import require_no_effect, require_one_of, require_stated
+from jamshape.checks import ArgumentError, require_no_effect, require_one_of, require_stated
 from jamshape.files.disk import named
 from jamshape.front.packing import Packing
 from jamshape.front.reading import Held, packing_of
@@ -37,6 +37,13 @@ def start_of(start: Held, sides: int = 2) -> Packing:
         warnings.warn(said, stacklevel=4)
     law = known.law.but(sides=sides)
     return known.with_(law=law, results=known.results, file=known.file)
+
+
+def require_known_kinks(sides: int, dimension: int) -> None:
+    """Refuse the law on whose kinks implicit steps would end."""
+    if sides != 2 and dimension != 2:
+        said = "implicit steps in 3D do not take {sides}, expected 2; choose another integrator"
+        raise ArgumentError(said, {"sides": sides})
 
 
 def told_of(start: Packing) -> dict[str, Any]:

@@ -23,6 +23,9 @@ from jamshape.packing import State, body_axes
 Units = _contact.StageUnits
 
 
+# Kinks of the energy on which a state is held.
+StageKinks = _contact.StageKinks
+
 # Stopping criteria of a minimisation, and Newton's equations.
 DescentStop = _contact.DescentStop
 NewtonSystem = _contact.NewtonSystem
@@ -65,6 +68,8 @@ class StageFactors(NamedTuple):
     factors: Factorisation
     n_bonds: int
     """Number of bonds at that point."""
+    kinks: StageKinks
+    """Kinks on which the state was held there."""
 
 
 class Solution(NamedTuple):
@@ -77,6 +82,8 @@ class Solution(NamedTuple):
     factorisations: int
     directions: int
     solved: bool
+    kinks: StageKinks
+    """Kinks on which it ends."""
 
 
 class LocalEnergyModel:
@@ -172,11 +179,11 @@ class LocalEnergyModel:
         return Factorisation(self._compiled.factorise(x, strain, diagonal))
 
     def solve(
-        self, stage: Stage, factors: StageFactors | None, units: Units, accuracy: float
+        self, stage: Stage, known: StageFactors | StageKinks | None, units: Units, accuracy: float
     ) -> Solution:
         """Solve a stage until the next correction is smaller than an accuracy in these units.
 
-        Reuses factors of an earlier, similar stage.
+        Reuses factors of an earlier, similar stage, or only the kinks on which that ended.
 
         Raises
         ------
@@ -187,15 +194,18 @@ class LocalEnergyModel:
         posed = _contact.Stage(
             stage.drag, stage.centre, stage.extended, units, limits, *stage.guesses
         )
-        known = (factors.factors.compiled, factors.n_bonds) if factors else (None, 0)
-        end = self._compiled.solve_stage(posed, *known, self._renew)
+        factors, n_bonds, kinks = None, 0, known or StageKinks()
+        if isinstance(known, StageFactors):
+            factors, n_bonds, kinks = known.factors.compiled, known.n_bonds, known.kinks
+        end = self._compiled.solve_stage(posed, factors, n_bonds, self._renew, kinks)
         self.landscape.evaluations += end.evaluations
         found = None
         if end.factors is not None:
-            found = StageFactors(Factorisation(end.factors), end.bonds_of_factors)
+            found = StageFactors(Factorisation(end.factors), end.bonds_of_factors, end.kinks)
         return Solution(
-            end.x, self._accepted(end.sums), found, end.factorisations, end.directions, end.solved
-        )
+            end.x, self._accepted(end.sums), found, end.factorisations, end.directions, end.solved,
+            end.kinks,
+        )  # fmt: skip
 
     def descend(self, stop: DescentStop, shift: float) -> DescentEnd:
         """Minimise the energy at fixed box by L-BFGS and Newton's method; the base moves along.

@@ -101,8 +101,7 @@ def measure(landscape: Landscape, minimum: Minimum) -> Measured:
         "z_iso": packing.z_iso,
         **order(packing),
     }
-    if D == 3:
-        attributes |= packing.shape.described(packing.diameters, packing.form)
+    attributes |= packing.shape.described(packing.diameters, packing.form, D)
     rattler_ids = packing.id[found.rattlers].astype(np.float64)
     return Measured(attributes, {"rattler_ids": rattler_ids} | _net(landscape, minimum, found))
 

@@ -28,6 +28,11 @@ _MOST_OPENINGS = 30
 _PART = 5000  # evaluations after which a long minimisation is reported and stored
 _MOST_PARTS = 40  # of them before it is given up
 
+# Before a search for an energy the box is compressed further after one part, once in a row, if U/N is below a multiple
+# of the energy tolerance, about what a step adds to a jammed packing: the search opens it again, while the evaluations
+# to the end of such a minimisation grow with N.
+_LITTLE = 50.0
+
 _FEW, _MANY = 40, 150  # evaluations of minimisations after which steps grow and shrink
 _GROWTH = 1.5
 
@@ -89,7 +94,7 @@ class QuasistaticRun:
     step
         Next increment of phi.
     loose, loose_phi
-        Densest unjammed state, if any.
+        Densest unjammed state, or not known to be jammed, if any.
     jammed_phi
         Packing fraction of the least dense jammed state, if any.
     openings
@@ -101,6 +106,8 @@ class QuasistaticRun:
         Jammed packing, once found.
     parts
         Completed parts of the present long minimisation.
+    left
+        Whether the last minimisation, that of `loose`, was left unfinished.
     """
 
     state: State
@@ -113,6 +120,7 @@ class QuasistaticRun:
     halves: bool = False
     minimum: Minimum | None = None
     parts: int = 0
+    left: bool = False
     history: History = field(default_factory=History)
 
     @classmethod
@@ -177,12 +185,18 @@ def advance(landscape: Landscape, compression: QuasistaticRun, protocol: Quasist
         compression.halve()
         return
     compression.parts += 1
-    if found.outcome is Outcome.EXHAUSTED and compression.parts < _MOST_PARTS:
+    per_particle = found.evaluation.energy / landscape.particles.n
+    is_unfinished = found.outcome is Outcome.EXHAUSTED
+    if is_unfinished and _may_be_left(compression, per_particle, protocol):
+        compression.parts, compression.left = 0, True
+        compression.loose, compression.loose_phi = found.state, compression.phi
+        compression.begin(_next_step(compression.step, _PART, protocol))
+        return
+    if is_unfinished and compression.parts < _MOST_PARTS:
         compression.state = found.state
         return
     evaluations = landscape.evaluations - before + (compression.parts - 1) * _PART
-    compression.parts = 0
-    per_particle = found.evaluation.energy / landscape.particles.n
+    compression.parts, compression.left = 0, False
     if per_particle <= protocol.energy:
         _go_on_from_unjammed(compression, found, evaluations, protocol)
     elif compression.loose is None:
@@ -198,6 +212,18 @@ def advance(landscape: Landscape, compression: QuasistaticRun, protocol: Quasist
         compression.minimum, compression.state = found, found.state
     else:
         _go_on_from_jammed(landscape, compression, found, protocol)
+
+
+def _is_rough(protocol: Quasistatic) -> bool:
+    """Whether any state beyond jamming will do, from which a search for an energy follows."""
+    return protocol.coarse is not None and math.isinf(protocol.closeness)
+
+
+def _may_be_left(compression: QuasistaticRun, per_particle: float, protocol: Quasistatic) -> bool:
+    """Whether a long minimisation close to jamming need not be finished before the next step."""
+    if not _is_rough(protocol) or compression.left or compression.loose is None:
+        return False
+    return math.isnan(compression.jammed_phi) and per_particle <= _LITTLE * protocol.energy
 
 
 def _is_narrow(compression: QuasistaticRun) -> bool:

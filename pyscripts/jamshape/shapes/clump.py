@@ -142,6 +142,13 @@ class Clump(Shape):
         rows = _discs(form)
         return {"discs": text_of(rows)}, float(diameters[0] / (2 * _half_extents(rows)[0]))
 
+    def perimeter(self, diameters: FloatArray, form: FloatArray) -> float:
+        """See `Shape.perimeter`."""
+        contact = importlib.import_module("jamshape._contact")
+        rows = self._placed_discs(diameters, form)
+        which, begin, end = contact.boundary_arcs(rows).T
+        return float((rows[which.astype(int), 3] * (end - begin)).sum())
+
     def outline(self, diameters: FloatArray, form: FloatArray, points: int = 64) -> FloatArray:
         """See `Shape.outline`: closed curves of arcs, joined by a line there and back where there are several."""
         contact = importlib.import_module("jamshape._contact")

@@ -30,6 +30,12 @@ class Dimer(ElongatedShape):
     )  # fmt: skip
     examples = ({"alpha": 1.0}, {"alpha": 0.4}, {"alpha": 1.3})
 
+    def perimeter(self, diameters: FloatArray, form: FloatArray) -> float:
+        """See `Shape.perimeter`."""
+        del form
+        radius, A = float(diameters[1]) / 2, self.spine(diameters)
+        return 4 * radius * (np.pi - self._waist(radius, A))
+
     def outline(self, diameters: FloatArray, form: FloatArray, points: int = 64) -> FloatArray:
         """See `Shape.outline`."""
         del form

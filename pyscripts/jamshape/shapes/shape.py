@@ -349,10 +349,22 @@ class Shape(ABC):
         del law
         return f"{self.name}/harmonic"
 
-    def described(self, diameters: FloatArray, form: FloatArray) -> dict[str, float]:
-        """Return descriptors of the first of (N, 3) diameters and (N, K) forms."""
-        del diameters, form
-        return {}
+    def described(
+        self, diameters: FloatArray, form: FloatArray, dimension: int
+    ) -> dict[str, float]:
+        """Return descriptors of the first of (N, 3) diameters and (N, K) forms.
+
+        In the plane the asphericity, perimeter^2 / (4 pi area): 1 for discs (VanderWerf et al. 2018).
+        """
+        if dimension != 2:  # noqa: PLR2004
+            return {}
+        area = float(self.compiled((diameters[:1], form[:1]), 2, Interaction()).measure[0])
+        length = self.perimeter(diameters[0], form[0])
+        return {"asphericity": length**2 / (4 * np.pi * area)}
+
+    @abstractmethod
+    def perimeter(self, diameters: FloatArray, form: FloatArray) -> float:
+        """Length of the boundary of a particle in the plane, from (3,) diameters and its (K,) form, [length]."""
 
     @abstractmethod
     def outline(self, diameters: FloatArray, form: FloatArray, points: int = 64) -> FloatArray:

@@ -32,6 +32,12 @@ class Spherocylinder(ElongatedShape):
         """See `Shape.stem`."""
         return "alpha" + in_name(parameters["alpha"])
 
+    def perimeter(self, diameters: FloatArray, form: FloatArray) -> float:
+        """See `Shape.perimeter`."""
+        del form
+        radius = float(diameters[1]) / 2
+        return 4 * self.spine(diameters) + 2 * np.pi * radius
+
     def outline(self, diameters: FloatArray, form: FloatArray, points: int = 64) -> FloatArray:
         """See `Shape.outline`."""
         del form

@@ -146,6 +146,13 @@ class Spheropolygon(Shape):
         told = {"corners": text_of(_corners(form)), "rounding": float(form[0])}
         return told, float(diameters[0] / (2 * _half_extents(form)[0]))
 
+    def perimeter(self, diameters: FloatArray, form: FloatArray) -> float:
+        """See `Shape.perimeter`."""
+        rows = _corners(form)
+        of_core = np.linalg.norm(np.roll(rows, -1, axis=0) - rows, axis=1).sum()
+        scale = diameters[0] / (2 * _half_extents(form)[0])
+        return float(scale * (of_core + 2 * np.pi * form[0]))
+
     def outline(self, diameters: FloatArray, form: FloatArray, points: int = 64) -> FloatArray:
         """See `Shape.outline`."""
         rows, scale = _corners(form), diameters[0] / (2 * _half_extents(form)[0])

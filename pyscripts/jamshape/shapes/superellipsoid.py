@@ -12,7 +12,7 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.checks import Range
 from jamshape.shapes.mesh import SurfaceMesh, arc
-from jamshape.shapes.roundness import asphericity, axes_from, reduced_aspect_ratio
+from jamshape.shapes.roundness import asphericity, axes_from, perimeter, reduced_aspect_ratio
 from jamshape.shapes.shape import (
     Parameter,
     Shape,
@@ -88,13 +88,21 @@ class Superellipsoid(Shape):
         a, b, c = (float(axis) for axis in np.sort(diameters) / 2)
         return {"exponent": float(form[0]), "w1": a / b, "w2": c / b}, a
 
-    def described(self, diameters: FloatArray, form: FloatArray) -> dict[str, float]:
-        """Asphericity and beta (Yuan et al. 2019, Eq. 2 and Sec. 2.1)."""
+    def described(
+        self, diameters: FloatArray, form: FloatArray, dimension: int
+    ) -> dict[str, float]:
+        """See `Shape.described`; in space asphericity and beta (Yuan et al. 2019, Eq. 2 and Sec. 2.1)."""
+        if dimension == 2:  # noqa: PLR2004
+            return super().described(diameters, form, dimension)
         axes = diameters[0] / 2
         return {
             "asphericity": float(asphericity(axes, form[0, 0])),
             "beta": float(reduced_aspect_ratio(axes)),
         }
+
+    def perimeter(self, diameters: FloatArray, form: FloatArray) -> float:
+        """See `Shape.perimeter`."""
+        return perimeter(diameters[:2] / 2, float(form[0]))
 
     def stem(self, parameters: Mapping[str, float]) -> str:
         """See `Shape.stem`."""

@@ -1,4 +1,5 @@
 import itertools
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -171,6 +172,27 @@ def test_minimisations_that_do_not_end_are_given_up_after_so_many_parts(monkeypa
     assert max(parts) == 2
     for at, after in itertools.pairwise(parts):
         assert after in {0, at + 1}
+
+
+def test_before_a_search_long_minimisations_are_left_once_in_a_row(monkeypatch):
+    monkeypatch.setattr(quasistatic, "_PART", 60)
+    rough = replace(ADAPTIVE, closeness=math.inf)
+    landscape, compression, protocol = begun(n=24, phi=0.5, protocol=rough)
+    left = []
+    for at in compress(landscape, compression, protocol):
+        left.append(at.left)
+        if at.left:  # what a step of compression adds to a jammed packing would be as much
+            assert at.parts == 0
+            per_particle = landscape.evaluate(at.loose).energy / 24
+            assert 1 < per_particle / protocol.energy <= quasistatic._LITTLE
+            assert at.phi == pytest.approx(at.loose_phi + at.step, rel=1e-12)
+    assert any(left)
+    assert not any(one and after for one, after in itertools.pairwise(left))
+    assert compression.minimum is not None
+    assert compression.minimum.is_at_rest
+    # As close to the tolerance as asked for, every one is finished.
+    landscape, compression, protocol = begun(n=24, phi=0.5, protocol=ADAPTIVE)
+    assert not any(at.left for at in compress(landscape, compression, protocol))
 
 
 def test_a_coarse_step_is_no_finer_than_the_step():
