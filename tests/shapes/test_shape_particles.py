@@ -67,7 +67,9 @@ def test_parameters_make_particles_that_fit_and_come_back(case):
     assert SHAPES[guess_shape_style(diameters)].fits(diameters)
     shape.check_form(form, case.dimension)
     assert "$" in shape.label(parameters)
-    assert all(math.isfinite(value) for value in shape.described(diameters, form, case.dimension).values())
+    assert all(
+        math.isfinite(value) for value in shape.described(diameters, form, case.dimension).values()
+    )
 
 
 @pytest.mark.parametrize("name", SHAPES)
