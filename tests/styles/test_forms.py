@@ -31,8 +31,10 @@ def test_numbers_in_a_file_are_those_in_the_line(name, ranks, tmp_path):
             path = tmp_path / f"form{words[1]}.txt"
             rows = [" ".join(words[k : k + 4]) for k in range(4, len(words), 4)]
             path.write_text("# of one type\n" + "  # so many\n".join(rows) + "\n")
-            line, n_files = f"{' '.join(words[:4])} {path.name}", n_files + 1
-        lines.append(line)
+            lines.append(f"{' '.join(words[:4])} {path.name}")
+            n_files += 1
+        else:
+            lines.append(line)
     assert n_files > 1
     one, other = (run_lmp_well(f"{x}\n{SHOWN}", tmp_path, ranks) for x in (text, "\n".join(lines)))
     assert shown(one) == shown(other)
@@ -53,7 +55,7 @@ def test_numbers_in_a_file_are_those_in_the_line(name, ranks, tmp_path):
     ],
 )  # fmt: skip
 def test_other_numbers_are_refused_in_a_sentence(style, numbers, message, tmp_path):
-    (tmp_path / "words.txt").write_text("0 0 0 0.5\nno numbers\n")
+    (tmp_path / "words.txt").write_text("0 0 0 0.5\nno\n")
     deck = f"""
         {before_box(2)}
         {load_plugin()}
