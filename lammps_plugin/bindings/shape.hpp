@@ -58,40 +58,21 @@ template <class Model> class ShapeOf {
   using Shape = typename Model::Shape;
   using Law = typename Model::Law;
 
-  ShapeOf(const Array2<double> &diameters, const Array2<double> &form, int dimension, double k_e,
-          int sides) : ShapeOf(diameters, form, dimension, Laws<Law>(law_of<Model>(k_e, sides)))
+  /// `form` is an Array2 (N, K) or, of exponents, an Array1 (N,), which shapes without ignore.
+  template <class Numbers>
+  ShapeOf(const Array2<double> &diameters, const Numbers &form, int dimension, double k_e,
+          int sides) :
+      ShapeOf(diameters, rows_of(form), dimension, Laws<Law>(law_of<Model>(k_e, sides)))
   {
   }
 
   /// k_e (T, T) by species (N,), numbered from 1.
-  ShapeOf(const Array2<double> &diameters, const Array2<double> &form, int dimension,
+  template <class Numbers>
+  ShapeOf(const Array2<double> &diameters, const Numbers &form, int dimension,
           const Array2<double> &k_e, const Array1<std::int64_t> &species, int sides) :
-      ShapeOf(diameters, form, dimension, laws_of<Model>(k_e, species, sides))
+      ShapeOf(diameters, rows_of(form), dimension, laws_of<Model>(k_e, species, sides))
   {
     require(species.size() == n(), "species does not have the shape (N,).");
-  }
-
-  ShapeOf(const Array2<double> &diameters, const Array2<double> &form, int dimension,
-          Laws<Law> laws) : space(dimension), contact_laws(std::move(laws))
-  {
-    require(dimension == 2 || dimension == 3,
-            "dimension is " + std::to_string(dimension) + ", expected 2 or 3.");
-    require(diameters.shape(1) == 3 && form.shape(0) == diameters.shape(0),
-            "diameters and form do not have shapes (N, 3) and (N, K).");
-    particles.reserve(diameters.shape(0));
-    // Particles of several forms come in any order, and moments of balls take milliseconds.
-    std::map<FormNumbers, std::optional<typename Model::Form>> forms;
-    for (std::size_t i = 0; i < diameters.shape(0); ++i) {
-      const double *const row = form.data() + form.shape(1) * i;
-      const auto [at, is_new] = forms.try_emplace(FormNumbers(row, row + form.shape(1)));
-      auto &its = at->second;
-      if (is_new) its = Model::Form::from(at->first, dimension);
-      std::optional<Shape> shape;
-      if (its) shape = Model::shape_from(0.5 * read_vec<3>(diameters.data() + 3 * i), *its);
-      require(shape.has_value(), "particle " + std::to_string(i) +
-                                     " is not a valid shape: " + Model::SHAPE_RULE + ".");
-      particles.push_back(*shape);
-    }
   }
 
   std::size_t n() const { return particles.size(); }
@@ -115,6 +96,43 @@ template <class Model> class ShapeOf {
   int space;
   Laws<Law> contact_laws;
   std::vector<Shape> particles;
+
+  /// Numbers of the forms, in rows.
+  struct Rows {
+    const double *data;
+    std::size_t n, width;
+  };
+  static Rows rows_of(const Array2<double> &form)
+  {
+    return {form.data(), form.shape(0), form.shape(1)};
+  }
+  static Rows rows_of(const Array1<double> &exponent)
+  {
+    return {exponent.data(), exponent.shape(0), *Model::FORM ? std::size_t{1} : std::size_t{0}};
+  }
+
+  ShapeOf(const Array2<double> &diameters, const Rows &form, int dimension, Laws<Law> laws) :
+      space(dimension), contact_laws(std::move(laws))
+  {
+    require(dimension == 2 || dimension == 3,
+            "dimension is " + std::to_string(dimension) + ", expected 2 or 3.");
+    require(diameters.shape(1) == 3 && form.n == diameters.shape(0),
+            "diameters and form do not have shapes (N, 3) and (N, K).");
+    particles.reserve(diameters.shape(0));
+    // Particles of several forms come in any order, and moments of balls take milliseconds.
+    std::map<FormNumbers, std::optional<typename Model::Form>> forms;
+    for (std::size_t i = 0; i < diameters.shape(0); ++i) {
+      const double *const row = form.data + form.width * i;
+      const auto [at, is_new] = forms.try_emplace(FormNumbers(row, row + form.width));
+      auto &its = at->second;
+      if (is_new) its = Model::Form::from(at->first, dimension);
+      std::optional<Shape> shape;
+      if (its) shape = Model::shape_from(0.5 * read_vec<3>(diameters.data() + 3 * i), *its);
+      require(shape.has_value(), "particle " + std::to_string(i) +
+                                     " is not a valid shape: " + Model::SHAPE_RULE + ".");
+      particles.push_back(*shape);
+    }
+  }
 };
 
 /// Name of a shape's class: that of the shape, in the plural.

@@ -8,6 +8,7 @@
 
 #include <cmath>
 #include <optional>
+#include <type_traits>
 #include <vector>
 
 namespace jamshape {
@@ -207,14 +208,21 @@ template <class Model> void export_shape(nb::module_ &m)
   using namespace nb::literals;
   using Self = ShapeOf<Model>;
   nb::class_<Self> of(m, class_name<Model>().c_str(), Model::SHAPE_RULE);
-  of.def(nb::init<const Array2<double> &, const Array2<double> &, int, double, int>(),
-         "diameters"_a, "form"_a, "dimension"_a, "k_e"_a, "sides"_a,
-         "Particles of diameters (N, 3) and further numbers (N, K), such as exponents; sides is\n"
-         "1 or 2, the bonds of a side-to-side contact, for shapes whose law supports both.");
-  of.def(nb::init<const Array2<double> &, const Array2<double> &, int, const Array2<double> &,
-                  const Array1<std::int64_t> &, int>(),
-         "diameters"_a, "form"_a, "dimension"_a, "k_e"_a, "species"_a, "sides"_a,
-         "The same with a symmetric k_e (T, T) by species (N,), numbered from 1.");
+  const auto def_made_of = [&](auto numbers, const char *name, const char *text) {
+    using Numbers = typename decltype(numbers)::type;
+    of.def(nb::init<const Array2<double> &, const Numbers &, int, double, int>(), "diameters"_a,
+           nb::arg(name), "dimension"_a, "k_e"_a, "sides"_a, text);
+    of.def(nb::init<const Array2<double> &, const Numbers &, int, const Array2<double> &,
+                    const Array1<std::int64_t> &, int>(),
+           "diameters"_a, nb::arg(name), "dimension"_a, "k_e"_a, "species"_a, "sides"_a,
+           "The same with a symmetric k_e (T, T) by species (N,), numbered from 1.");
+  };
+  def_made_of(
+      std::common_type<Array2<double>>(), "form",
+      "Particles of diameters (N, 3) and further numbers (N, K), such as exponents; sides is\n"
+      "1 or 2, the bonds of a side-to-side contact, for shapes whose law supports both.");
+  def_made_of(std::common_type<Array1<double>>(), "exponent",
+              "The same with exponents (N,), ignored by shapes without them.");
   of.attr("name") = Model::NAME;
   of.attr("core") = Model::CORE;
   of.attr("most_bonds") = Model::MOST_BONDS;
