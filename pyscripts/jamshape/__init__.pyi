@@ -31,14 +31,14 @@ from .front.shearing import shear as shear
 from .lammps.session import Session as Session
 from .measures.nonaffine import Nonaffine as Nonaffine
 from .packing import Box as Box
+from .shapes.clump import bumpy_discs as bumpy_discs
+from .shapes.clump import dimer_discs as dimer_discs
+from .shapes.clump import trimer_discs as trimer_discs
 from .shapes.named import Clumps as Clumps
 from .shapes.named import Dimers as Dimers
 from .shapes.named import Spherocylinders as Spherocylinders
 from .shapes.named import Spheropolygons as Spheropolygons
 from .shapes.named import Superellipsoids as Superellipsoids
-from .shapes.clump import bumpy_discs as bumpy_discs
-from .shapes.clump import dimer_discs as dimer_discs
-from .shapes.clump import trimer_discs as trimer_discs
 from .shapes.particles import Kind as Kind
 from .shapes.particles import Particles as Particles
 from .shapes.shape import Interaction as Interaction

@@ -97,7 +97,8 @@ bool holds_centre(const SpheropolygonBody<D, T> &of, const SpheropolygonBody<D, 
 }
 
 /// Calls `visit` with each two sides that face each other and may be closer than `reach`, and their
-/// spines, until it returns false. Returns false if the centre of one body lies in the other's core.
+/// spines, until it returns false. Returns false if the centre of one body lies in the other's
+/// core.
 template <int D, class T, class Visit>
 bool each_two_sides(const SpheropolygonBody<D, T> &i, const SpheropolygonBody<D, T> &j, T reach,
                     const Visit &visit)
@@ -121,8 +122,8 @@ bool each_two_sides(const SpheropolygonBody<D, T> &i, const SpheropolygonBody<D,
   return !holds_centre(i, j) && !holds_centre(j, i);
 }
 
-/// A contact of two sides, of arms about their middles, as one about the centres of the bodies, given
-/// the vectors from there to the middles.
+/// A contact of two sides, of arms about their middles, as one about the centres of the bodies,
+/// given the vectors from there to the middles.
 template <int D, class S>
 Contact<D, S, 2> about_centres(Contact<D, S, 2> contact, const Vec<D, S> &to_i,
                                const Vec<D, S> &to_j)
@@ -136,6 +137,15 @@ Contact<D, S, 2> about_centres(Contact<D, S, 2> contact, const Vec<D, S> &to_i,
     bond.lever_j -= cross(to_j, bond.normal);
   }
   return contact;
+}
+
+/// Names a contact with one bond by where this lies. Two sides that share a corner have equal
+/// energies there, and rounding decides between them; only one of them may face the other body.
+template <int D, class S> void name_corner(Contact<D, S, 2> &contact)
+{
+  if (contact.n_bonds != 1 || contact.kind != ContactKind::SIDE_TO_SIDE) return;
+  const bool is_on_side = contact.bond[0].on_side_i || contact.bond[0].on_side_j;
+  contact.kind = is_on_side ? ContactKind::TIP_TO_SIDE : ContactKind::TIP_TO_TIP;
 }
 
 /// Contact of two rounded polygons: that of the two of their sides with the largest energy, each
@@ -165,12 +175,15 @@ Contact<D, S, 2> contact_of(const SpheropolygonBody<D, S> &i, const Spheropolygo
   const bool is_clear = each_two_sides<D, T>(values_of(i), values_of(j), R_i + R_j, compare);
   if (!is_clear) return without_bonds<D, S, 2>(ContactStatus::CROSSING);
   if (best.status != ContactStatus::TOUCHING) return without_bonds<D, S, 2>(best.status);
+  Contact<D, S, 2> found;
   if constexpr (std::is_same_v<S, T>) {
-    return about_centres(best, i.middle(side_i), j.middle(side_j));
+    found = about_centres(best, i.middle(side_i), j.middle(side_j));
   } else {
     const SpherocylinderContact<D, S> there(sides_of(i, side_i, j, side_j), R_i, R_j, law);
-    return about_centres(there.evaluate(), i.middle(side_i), j.middle(side_j));
+    found = about_centres(there.evaluate(), i.middle(side_i), j.middle(side_j));
   }
+  if (law.sides == Sides::TWO && i.n() + j.n() > 2) name_corner(found);
+  return found;
 }
 
 /// Interface of a shape (see SpherocylinderModel).

@@ -356,7 +356,7 @@ class Shape(ABC):
 
         In the plane the asphericity, perimeter^2 / (4 pi area): 1 for discs (VanderWerf et al. 2018).
         """
-        if dimension != 2:  # noqa: PLR2004
+        if dimension != 2:
             return {}
         area = float(self.compiled((diameters[:1], form[:1]), 2, Interaction()).measure[0])
         length = self.perimeter(diameters[0], form[0])

@@ -92,7 +92,7 @@ class Superellipsoid(Shape):
         self, diameters: FloatArray, form: FloatArray, dimension: int
     ) -> dict[str, float]:
         """See `Shape.described`; in space asphericity and beta (Yuan et al. 2019, Eq. 2 and Sec. 2.1)."""
-        if dimension == 2:  # noqa: PLR2004
+        if dimension == 2:
             return super().described(diameters, form, dimension)
         axes = diameters[0] / 2
         return {

@@ -5,7 +5,6 @@ from jamshape.drawing.space import box_edges, faces_of, painted, view
 from jamshape.packing import Box, Packing
 from jamshape.shapes.table import SHAPES
 
-
 IN_SPACE = pytest.mark.parametrize(
     "shape", [name for name, shape in SHAPES.items() if 3 in shape.dimensions]
 )
