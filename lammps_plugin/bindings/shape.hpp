@@ -101,14 +101,17 @@ template <class Model> class ShapeOf {
   struct Rows {
     const double *data;
     std::size_t n, width;
+    const char *expected;
   };
   static Rows rows_of(const Array2<double> &form)
   {
-    return {form.data(), form.shape(0), form.shape(1)};
+    return {form.data(), form.shape(0), form.shape(1),
+            "diameters and form do not have shapes (N, 3) and (N, K)."};
   }
   static Rows rows_of(const Array1<double> &exponent)
   {
-    return {exponent.data(), exponent.shape(0), *Model::FORM ? std::size_t{1} : std::size_t{0}};
+    return {exponent.data(), exponent.shape(0), *Model::FORM ? std::size_t{1} : std::size_t{0},
+            "diameters and exponent do not have shapes (N, 3) and (N,)."};
   }
 
   ShapeOf(const Array2<double> &diameters, const Rows &form, int dimension, Laws<Law> laws) :
@@ -116,8 +119,7 @@ template <class Model> class ShapeOf {
   {
     require(dimension == 2 || dimension == 3,
             "dimension is " + std::to_string(dimension) + ", expected 2 or 3.");
-    require(diameters.shape(1) == 3 && form.n == diameters.shape(0),
-            "diameters and form do not have shapes (N, 3) and (N, K).");
+    require(diameters.shape(1) == 3 && form.n == diameters.shape(0), form.expected);
     particles.reserve(diameters.shape(0));
     // Particles of several forms come in any order, and moments of balls take milliseconds.
     std::map<FormNumbers, std::optional<typename Model::Form>> forms;

@@ -49,9 +49,7 @@ double size_of(const StageUnits &units, const Array1<double> &shift, const Array
   return units.size(vector(shift), vector(force), vector(drag));
 }
 
-}  // namespace
-
-void export_stages(nb::module_ &m)
+void export_settings(nb::module_ &m)
 {
   using namespace nb::literals;
   nb::class_<StageUnits>(m, "StageUnits", "Units of the errors of displacements.")
@@ -70,20 +68,10 @@ void export_stages(nb::module_ &m)
             new (place) StageLimits{accuracy, {longest_step, widest_turn}};
           },
           "accuracy"_a, "longest_step"_a, "widest_turn"_a);
-  nb::class_<PosedStage>(m, "Stage",
-                         "The equation drag (x - centre) + dU/dx = 0, with x relative to the base.")
-      .def(
-          "__init__",
-          [](PosedStage *place, const Array1<double> &drag, const Array1<double> &centre,
-             bool extended, const StageUnits &units, const StageLimits &limits,
-             const Array1<double> &guess, const Array1<double> &other) {
-            new (place) PosedStage{{vector(drag), vector(centre), extended},
-                                   units,
-                                   limits,
-                                   vector(guess),
-                                   vector(other)};
-          },
-          "drag"_a, "centre"_a, "extended"_a, "units"_a, "limits"_a, "guess"_a, "other"_a);
+}
+
+void export_kinks(nb::module_ &m)
+{
   nb::class_<StageKinks>(m, "StageKinks", "Kinks of the energy on which a state is held.")
       .def(nb::init<>())
       .def("__len__", [](const StageKinks &of) { return of.all.size(); })
@@ -103,6 +91,29 @@ void export_stages(nb::module_ &m)
             return found;
           },
           "Weights from 0 to 1 of the second of the two slopes.");
+}
+
+}  // namespace
+
+void export_stages(nb::module_ &m)
+{
+  using namespace nb::literals;
+  export_settings(m);
+  export_kinks(m);
+  nb::class_<PosedStage>(m, "Stage",
+                         "The equation drag (x - centre) + dU/dx = 0, with x relative to the base.")
+      .def(
+          "__init__",
+          [](PosedStage *place, const Array1<double> &drag, const Array1<double> &centre,
+             bool extended, const StageUnits &units, const StageLimits &limits,
+             const Array1<double> &guess, const Array1<double> &other) {
+            new (place) PosedStage{{vector(drag), vector(centre), extended},
+                                   units,
+                                   limits,
+                                   vector(guess),
+                                   vector(other)};
+          },
+          "drag"_a, "centre"_a, "extended"_a, "units"_a, "limits"_a, "guess"_a, "other"_a);
   nb::class_<StageEnd>(m, "StageEnd")
       .def_prop_ro("x", [](const StageEnd &end) { return array_of(end.x.data(), end.x.size()); })
       .def_prop_ro("sums", [](const StageEnd &end) { return tuple_of(end.sums); })

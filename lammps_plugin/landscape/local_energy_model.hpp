@@ -153,7 +153,7 @@ class LocalEnergyModel {
 
   /// Whether energies have kinks whose two smooth pieces are known.
   virtual bool has_kinks() const = 0;
-  /// For each pair that may have a kink, the smooth piece on which it lies at a point.
+  /// The smooth piece on which each pair that may have a kink lies at a point.
   virtual std::map<PairName, int> pieces(const Displacement &at) const = 0;
   virtual std::vector<KinkThere> kinks_at(const Displacement &at, const std::vector<Kink> &kinks,
                                           bool extended) const = 0;

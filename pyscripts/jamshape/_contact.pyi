@@ -50,6 +50,20 @@ class _Shape:
         species: _Ints,
         sides: int,
     ) -> None: ...
+    @overload
+    def __init__(
+        self, diameters: _Reals, exponent: _Reals, dimension: int, k_e: float, sides: int
+    ) -> None: ...
+    @overload
+    def __init__(
+        self,
+        diameters: _Reals,
+        exponent: _Reals,
+        dimension: int,
+        k_e: _Reals,
+        species: _Ints,
+        sides: int,
+    ) -> None: ...
     def host_spin(self, orientation: _Reals, gradient: _Reals) -> _Reals: ...
     def near(
         self,

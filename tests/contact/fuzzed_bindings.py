@@ -13,7 +13,7 @@ import sys
 from collections import Counter
 
 import numpy as np
-from test_refusals import SHAPES, hard_poses, particles, split
+from test_refusals import SHAPES, dimensions_of, hard_poses, particles, split
 
 from jamshape import _contact
 
@@ -96,7 +96,8 @@ def over_pairs(fuzz, of, given):
 
 
 def of_shapes(fuzz):
-    shape, dimension = fuzz.one_of(list(SHAPES)), fuzz.one_of((2, 3))
+    shape = fuzz.one_of(list(SHAPES))
+    dimension = fuzz.one_of(dimensions_of(shape))
     rows, form = (np.tile(row, (3, 1)) for row in SHAPES[shape])
     made = fuzz.call(
         "shape", shape, diameters=rows, form=form, dimension=dimension, k_e=1.0, sides=2

@@ -38,7 +38,7 @@ def stubs():
     names = sorted(shape.compiled_name for shape in SHAPES.values())
     lines = NAMES.read_text(encoding="utf-8").splitlines(keepends=True)
     others = [line for line in lines if not line.startswith("from .shapes.named ")]
-    behind = next(k for k, line in enumerate(others) if line.startswith("from .shapes."))
+    behind = 1 + max(k for k, line in enumerate(others) if "from ." <= line < IMPORT)
     others[behind:behind] = [IMPORT.format(name) for name in names]
     functions = "".join(map(stub, SHAPES.values()))
     return {NAMES: "".join(others), FOLDER / "shapes/named.pyi": HEADER + functions}

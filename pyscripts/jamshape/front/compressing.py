@@ -264,7 +264,6 @@ def slow_compress(
     at = place(file, "slow.h5")
     sizes = {"n": n, "seed": seed, "dimension": dimension}
     of = _start_of(particles, start, phi=(phi_start, phi_end), sides=sides, **sizes)
-    require_known_kinks(sides, of.dimension)
 
     def first() -> Packing:
         # Random insertion of bodies in space may end far below that of rods in the plane.
@@ -293,6 +292,7 @@ def _start_of(
         phi_start = _PHI_HANDED_OVER[dimension] if phi_start is None else phi_start
         require_in("phi_start", phi_start, _HANDED_OVER if dimension == 2 else RANGES["phi_start"])
         require_rising(phi_start, phi_end)
+        require_known_kinks(sides, dimension)
         return Start.of(particles, Asked(phi=phi_start, **sizes), None, usual_phi=phi_start)
     of = Start.of(particles, Asked(phi=None, **sizes), start, usual_phi=phi_end, sides=sides)
     if (
@@ -302,6 +302,7 @@ def _start_of(
     ):
         said = f"{{phi_start}} differs from that of the start, {of.known.phi:.6g}, expected no value beside a start; leave it out"
         raise ArgumentError(said, {"phi_start": phi_start})
+    require_known_kinks(sides, of.dimension)
     return of
 
 
