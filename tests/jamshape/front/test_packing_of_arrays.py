@@ -26,7 +26,7 @@ def fields_alike(one, other):
 PLACES = [(shape, D) for shape in SHAPES.values() for D in shape.dimensions]
 
 
-@pytest.mark.parametrize(("shape", "dimension"), PLACES, ids=str)
+@pytest.mark.parametrize(("shape", "dimension"), PLACES, ids=lambda x: getattr(x, "name", x))
 def test_parameters_and_sizes_or_diameters_give_back_a_packing(shape, dimension):
     for parameters in shape.examples:
         packing = random_packing(6, 0.05, 1, Particles.of(shape, 1.4, **parameters), dimension)
