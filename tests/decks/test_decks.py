@@ -417,7 +417,7 @@ CASES = [
     (RODS, {"sides": "three"}, "three.*expected"),
     (RODS, {"phi_start": 0.8}, r"expected a PHI with room for random insertion, which stalled at"),
     (RODS, {"data": "none"}, "Cannot open file none"),
-    (BODIES, {"p": 0.5}, "expected diameters of its shape .* an exponent p above 0.5"),
+    (BODIES, {"p": 0.5}, "expected 'form' with a finite number above 0.5"),
     (BODIES, {"w1": "`touch X`"}, "Illegal variable"),
     ("minimize_spherocylinder", {}, "Found no state to minimise, expected -var restart FILE or -var data FILE"),
 ]  # fmt: skip

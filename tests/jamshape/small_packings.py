@@ -11,7 +11,7 @@ from squeezed import squeezed
 from jamshape.landscape import Landscape
 from jamshape.minima import Residual
 from jamshape.minima.target import Target, find
-from jamshape.vibration.hessian import dynamical_matrix
+from jamshape.vibration.hessian import DynamicalMatrixOptions, dynamical_matrix
 from jamshape.vibration.spectrum import spectrum
 
 # n, alpha, packing fraction just below jamming, seed
@@ -52,9 +52,25 @@ def sliding():
         matrix = dynamical_matrix(landscape, minimum.state)
         found = spectrum(matrix)
         values = np.abs(found.eigenvalues[~found.is_translation])
-        if 1e-16 < values.min() < 1e-12:  # an even smaller one is rounding
+        if not 1e-16 < values.min() < 1e-12:  # an even smaller one is rounding
+            continue
+        softest = int(np.abs(found.eigenvalues + found.is_translation).argmin())
+        if keeps_its_bonds(landscape, minimum.state, matrix, found.vectors[:, softest]):
             return landscape, minimum, matrix
     raise AssertionError
+
+
+def keeps_its_bonds(landscape, state, matrix, mode):
+    """Whether rods slide this far along a mode before they leave each other."""
+    force = DynamicalMatrixOptions(force=True)
+    for step in (1e-5, -1e-5):
+        try:
+            there = state.displaced(*matrix.coordinates.motion(step * mode))
+            if dynamical_matrix(landscape, there, force).n_bonds != matrix.n_bonds:
+                return False
+        except ValueError:  # no bond is left
+            return False
+    return True
 
 
 def second_order(matrix):
