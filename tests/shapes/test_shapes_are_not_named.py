@@ -19,4 +19,6 @@ def test_no_shape_is_named(path):
 
 def test_every_shape_has_scenes_in_the_plane_and_in_space():
     for cases in (ALL, MIXTURES, PURE, TYPICAL):
-        assert {case[:2] for case in cases} == {(name, D) for name in SHAPES for D in (2, 3)}
+        assert {case[:2] for case in cases} == {
+            (name, D) for name in SHAPES for D in SHAPES[name].dimensions
+        }

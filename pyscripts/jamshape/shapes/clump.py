@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from jamshape.arguments import checked
 from jamshape.arrays import FloatArray
 from jamshape.shapes.level_set import level_set_mesh
 from jamshape.shapes.mesh import SurfaceMesh, arc
@@ -213,6 +214,7 @@ def _joined(pieces: list[FloatArray]) -> FloatArray:
     return np.concatenate([first, first[:1] if around else first[:0], *around])
 
 
+@checked
 def dimer_discs(ratio: float = 1.0, distance: float = 1.0) -> FloatArray:
     """Return the discs of a dimer, the first of diameter 1.
 
@@ -236,6 +238,7 @@ def dimer_discs(ratio: float = 1.0, distance: float = 1.0) -> FloatArray:
     return np.array([[0.0, 0.0, 0.5], [distance * (1 + ratio) / 2, 0.0, ratio / 2]])
 
 
+@checked
 def trimer_discs(angle: float = 60.0) -> FloatArray:
     """Return three discs of diameter 1, the outer two touching the middle one, at an angle between them.
 
@@ -259,6 +262,7 @@ def trimer_discs(angle: float = 60.0) -> FloatArray:
     return np.array([[0.0, 0.0, 0.5], [-x, -y, 0.5], [x, -y, 0.5]])
 
 
+@checked
 def bumpy_discs(bumps: int = 12, depth: float = 0.2) -> FloatArray:
     """Return a ring of equal discs around a large one: a disc of diameter 1 with a rough surface (Papanikolaou et al. 2013).
 

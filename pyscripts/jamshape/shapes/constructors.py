@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from jamshape.arguments import checked
 from jamshape.arrays import real_numbers
 from jamshape.shapes.particles import Kind, Particles
-from jamshape.shapes.shape import Shape
+from jamshape.shapes.shape import Parameter, Shape
 
 _TABLE = 2  # dimensions
 _OF_KINDS = ("size", "share", "spread")
@@ -102,16 +102,16 @@ def _text_of(shape: Shape) -> str:
     )
 
 
-def _texts(value: Any) -> Any:
+def _texts(parameter: Parameter, value: Any) -> Any:
     """Return a parameter that is read from a text or a table as one object, or those of several kinds."""
     is_several = isinstance(value, list | tuple | np.ndarray) and all(
         isinstance(one, str) or np.ndim(one) == _TABLE for one in value
     )
     found = np.empty(len(value) if is_several else (), object)
     for k in range(len(value)) if is_several else ():
-        found[k] = value[k]
+        found[k] = parameter.read(value[k])
     if not is_several:
-        found[()] = value
+        found[()] = parameter.read(value)
     return found
 
 
@@ -131,9 +131,9 @@ def _particles(
             expected = ", ".join((*parameters, "size_ratio", *_OF_KINDS))
             msg = f"{name} is unknown for {shape.name}s, expected {expected}"
             raise ValueError(msg)
-    texts = {p.option for p in shape.parameters if isinstance(p.default, str)}
+    texts = {p.option: p for p in shape.parameters if isinstance(p.default, str)}
     values: dict[str, Any] = {
-        k: _texts(v) if k in texts else real_numbers(k, v)
+        k: _texts(texts[k], v) if k in texts else real_numbers(k, v)
         for k, v in {**parameters, **kinds}.items()
     }
     if not kinds and all(np.ndim(value) == 0 for value in values.values()):

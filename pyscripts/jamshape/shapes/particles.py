@@ -56,7 +56,7 @@ class Kind:
     >>> mixture = Particles.mixture("spherocylinder", [discs, rods])
     """
 
-    parameters: Mapping[str, Any] = field(default_factory=dict)
+    parameters: Mapping[str, float | str] = field(default_factory=dict)
     size: float = 1.0
     share: float = 1.0
     spread: float = 0.0

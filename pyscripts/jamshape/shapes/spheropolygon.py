@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from jamshape.arguments import checked
 from jamshape.arrays import FloatArray
 from jamshape.checks import Range
 from jamshape.shapes.mesh import SurfaceMesh, arc
@@ -51,6 +52,7 @@ def _placed(rows: FloatArray, rounding: float) -> FloatArray:
     return principal(np.insert(rows, 2, 0.0, axis=1), moments)[:, :2]
 
 
+@checked
 def regular_polygon(n: int) -> FloatArray:
     """Return the corners of a regular polygon with sides of length 1.
 

@@ -35,6 +35,7 @@ NEEDED = {
     "path": "x.h5",
     "file": "x.h5",
     "seeds": [1],
+    "n": 4,
 }
 NEEDED |= {"first": scene(), "second": scene()}
 FUNCTIONS = {name: getattr(js, name) for name in js.__all__ if inspect.isroutine(getattr(js, name))}
@@ -103,7 +104,14 @@ def test_what_is_of_no_known_type_is_refused_by_name(function, name, wrong, tmp_
         (lambda: js.plot(scene(), "axes"), "axes is 'axes', expected matplotlib axes without"),
         (lambda: js.Spherocylinders(None), "alpha has dtype object, expected real numbers"),
         (lambda: js.Spherocylinders([1, [2, 3]]), "alpha has rows of different lengths"),
-        (lambda: js.Kind({"alpha": "1"}), "parameters is .*expected a mapping of names to numbers"),
+        (
+            lambda: js.Kind({"alpha": None}),
+            "parameters is .*expected a mapping of names to numbers",
+        ),
+        (
+            lambda: js.Particles.mixture("spherocylinder", [js.Kind({"alpha": "1"})]),
+            "alpha is '1', expected",
+        ),
         (lambda: scene().with_(box=[1, 2]), r"box is \[1, 2\], expected a Box"),
         (lambda: scene().with_(position=3.0), r"position has shape \(\), expected"),
     ],

@@ -17,7 +17,7 @@ from jamshape.protocols.random_start import random_packing
 TOLERANCE = 1e-8
 N = 32
 SEEDS = (
-    44,
+    64,
     *range(1, 60),
 )  # nearly round rods, of which one packing comes to rest on a corner: the first, on most machines
 

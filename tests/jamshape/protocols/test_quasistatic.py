@@ -104,7 +104,7 @@ ADAPTIVE = Quasistatic(step=2e-3, energy=1e-8, coarse=4e-2)
 @pytest.fixture(scope="module")
 def adaptive():
     """List the step before, the evaluations and the step after each minimisation that left the packing unjammed."""
-    landscape, compression, protocol = begun(n=24, phi=0.3, protocol=ADAPTIVE)
+    landscape, compression, protocol = begun(n=32, phi=0.32, protocol=ADAPTIVE)
     rows, loose = [], compression.loose
     step, evaluations, reached = compression.step, landscape.evaluations, []
     for at in compress(landscape, compression, protocol):
@@ -136,7 +136,7 @@ def test_steps_that_adapt_are_fewer_and_end_as_close_to_the_tolerance(adaptive):
     compression, rows, reached = adaptive
     assert np.diff(reached).max() <= ADAPTIVE.coarse * (1 + 1e-9)
     assert len(rows) < (reached[-1] - reached[0]) / ADAPTIVE.step / 2
-    per_particle = compression.minimum.evaluation.energy / 24
+    per_particle = compression.minimum.evaluation.energy / 32
     assert 1 < per_particle / ADAPTIVE.energy <= ADAPTIVE.closeness
 
 
@@ -178,8 +178,11 @@ def test_before_a_search_long_minimisations_are_left_once_in_a_row(monkeypatch):
     monkeypatch.setattr(quasistatic, "_PART", 60)
     rough = replace(ADAPTIVE, closeness=math.inf)
     landscape, compression, protocol = begun(n=24, phi=0.5, protocol=rough)
-    left = []
+    left, loose = [], compression.loose
     for at in compress(landscape, compression, protocol):
+        if at.loose is loose:  # a part of a minimisation
+            continue
+        loose = at.loose
         left.append(at.left)
         if at.left:  # what a step of compression adds to a jammed packing would be as much
             assert at.parts == 0
