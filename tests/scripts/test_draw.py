@@ -145,8 +145,9 @@ def test_a_frame_of_a_run(report, problem, tmp_path):
     assert "expected frame 2" in problem(SCRIPT, tmp_path / "run.h5", "--frame", 2, *asked)
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
-@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize(
+    ("shape", "dimension"), [(name, D) for name in SHAPES for D in SHAPES[name].dimensions]
+)
 def test_every_shape_in_the_plane_and_in_space(report, tmp_path, shape, dimension):
     path = tmp_path / "mixture.h5"
     write_packing(path, mixture(shape, dimension))
