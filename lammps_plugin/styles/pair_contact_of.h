@@ -92,7 +92,7 @@ template <class Model> class PairContactOf : public PairContact {
   bool has_current_contacts() const override
   {
     const std::size_t known = domain->dimension == 2 ? in_2d.now.size() : in_3d.now.size();
-    return chosen_at == neighbor->lastcall && chosen_of == list->inum &&
+    return list != nullptr && chosen_at == neighbor->lastcall && chosen_of == list->inum &&
            known == static_cast<std::size_t>(n_all());
   }
 
