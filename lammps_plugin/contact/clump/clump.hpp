@@ -5,6 +5,7 @@
 #include "contact/compiled_once.hpp"
 #include "contact/contact.hpp"
 #include "contact/harmonic.hpp"
+#include "contact/math/region.hpp"
 #include "contact/math/rotation.hpp"
 #include "contact/math/vec.hpp"
 
@@ -155,19 +156,11 @@ struct ClumpModel {
 
   static Law law(double k_e, Sides, bool /*shortcuts*/ = true) { return {{k_e}}; }
 
-  /// Relative difference of extents that rounding leaves.
-  static constexpr double ROUNDING = 1e-9;
-
   static std::optional<Shape> shape_from(const Vec<3> &semi_axes, const Form &form)
   {
-    const Discs &discs = form.discs ? *form.discs : *one_disc();
-    const double scale = semi_axes[0] / discs.half_extents[0];
-    if (!(scale > 0.0) || !std::isfinite(scale)) return std::nullopt;
-    for (int k = 1; k < 3; ++k) {
-      const double expected = scale * discs.half_extents[k];
-      if (!(std::abs(semi_axes[k] - expected) <= ROUNDING * expected)) return std::nullopt;
-    }
-    return Shape{form.discs ? form.discs : one_disc(), scale};
+    const auto &discs = form.discs ? form.discs : one_disc();
+    const auto scale = scale_of(semi_axes, discs->half_extents);
+    return scale ? std::optional<Shape>({discs, *scale}) : std::nullopt;
   }
 
   template <int D> static Shortcut shortcut(const Shape &) { return Shortcut::NONE; }
@@ -175,10 +168,7 @@ struct ClumpModel {
 
   template <int D> static SubstrateDrag drag(const Shape &shape)
   {
-    SubstrateDrag drag = shape.discs->drag;
-    for (int k = 0; k < D; ++k) drag.measure *= shape.scale;
-    drag.moment = (shape.scale * shape.scale) * drag.moment;
-    return drag;
+    return scaled<D>(shape.discs->drag, shape.scale);
   }
 
   template <int D> static double outer_radius(const Shape &shape)
@@ -212,17 +202,9 @@ struct ClumpModel {
     return std::nullopt;
   }
 
-  /// The axis about which area (volume) lies closest, if there is one: the long axis of long
-  /// particles; flat ones and those of higher symmetry have no direction.
   template <int D> static std::optional<int> director(const Shape &shape)
   {
-    const Vec<3> &moment = shape.discs->drag.moment;
-    int least = 0, middle = 1;
-    if (moment[middle] < moment[least]) std::swap(least, middle);
-    if (D == 3 && moment[2] < moment[least]) middle = std::exchange(least, 2);
-    if (D == 3 && least != 2) middle = moment[2] < moment[middle] ? 2 : middle;
-    const bool is_long = moment[least] < (1.0 - ISOTROPIC) * moment[middle];
-    return is_long ? std::optional<int>(least) : std::nullopt;
+    return long_axis_of<D>(shape.discs->drag.moment);
   }
 
   template <int D, class S = double> static Body<D, S> body(const Shape &shape)
@@ -284,9 +266,6 @@ struct ClumpModel {
   }
 
  private:
-  /// Relative difference of moments that rounding and quadrature leave.
-  static constexpr double ISOTROPIC = 1e-6;
-
   static const std::shared_ptr<const Discs> &one_disc()
   {
     static const auto disc =

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -104,6 +105,39 @@ inline SubstrateDrag drag_of(const Moments &by)
 {
   const double xx = by.second[0], yy = by.second[1], zz = by.second[2], all = by.measure;
   return {all, {{(yy + zz) / all, (xx + zz) / all, (xx + yy) / all}}};
+}
+
+/// Area (volume) and moments of a body that is larger by a factor.
+template <int D> SubstrateDrag scaled(SubstrateDrag drag, double scale)
+{
+  for (int k = 0; k < D; ++k) drag.measure *= scale;
+  drag.moment = (scale * scale) * drag.moment;
+  return drag;
+}
+
+/// The factor by which a body is larger than one of these half extents; nothing if it has other
+/// proportions.
+inline std::optional<double> scale_of(const Vec<3> &semi_axes, const Vec<3> &half_extents)
+{
+  constexpr double ROUNDING = 1e-9;
+  const double scale = semi_axes[0] / half_extents[0];
+  if (!(scale > 0.0) || !std::isfinite(scale)) return std::nullopt;
+  for (int k = 1; k < 3; ++k) {
+    const double expected = scale * half_extents[k];
+    if (!(std::abs(semi_axes[k] - expected) <= ROUNDING * expected)) return std::nullopt;
+  }
+  return scale;
+}
+
+/// The body axis about which area (volume) lies closest, if there is one: the long axis of long
+/// particles; flat ones and those of higher symmetry have none.
+template <int D> std::optional<int> long_axis_of(const Vec<3> &moment)
+{
+  constexpr double ISOTROPIC = 1e-6;  // relative difference that rounding and quadrature leave
+  int order[3] = {0, 1, 2};
+  std::stable_sort(order, order + D, [&](int a, int b) { return moment[a] < moment[b]; });
+  const bool is_long = moment[order[0]] < (1.0 - ISOTROPIC) * moment[order[1]];
+  return is_long ? std::optional<int>(order[0]) : std::nullopt;
 }
 
 }  // namespace jamshape

@@ -2,6 +2,7 @@
 
 #include "contact/compiled_once.hpp"
 #include "contact/contact.hpp"
+#include "contact/math/region.hpp"
 #include "contact/math/rotation.hpp"
 #include "contact/math/vec.hpp"
 #include "contact/spherocylinder/spherocylinder.hpp"
@@ -214,19 +215,11 @@ struct SpheropolygonModel {
     return {{k_e}, sides, shortcuts};
   }
 
-  /// Relative difference of extents that rounding leaves.
-  static constexpr double ROUNDING = 1e-9;
-
   static std::optional<Shape> shape_from(const Vec<3> &semi_axes, const Form &form)
   {
     const auto &polygon = form.polygon ? form.polygon : disc();
-    const double scale = semi_axes[0] / polygon->half_extents[0];
-    if (!(scale > 0.0) || !std::isfinite(scale)) return std::nullopt;
-    for (int k = 1; k < 3; ++k) {
-      const double expected = scale * polygon->half_extents[k];
-      if (!(std::abs(semi_axes[k] - expected) <= ROUNDING * expected)) return std::nullopt;
-    }
-    return Shape{polygon, scale};
+    const auto scale = scale_of(semi_axes, polygon->half_extents);
+    return scale ? std::optional<Shape>({polygon, *scale}) : std::nullopt;
   }
 
   template <int D> static Shortcut shortcut(const Shape &shape)
@@ -237,9 +230,7 @@ struct SpheropolygonModel {
 
   template <int D> static SubstrateDrag drag(const Shape &shape)
   {
-    const double area = shape.scale * shape.scale;
-    const SubstrateDrag &of_form = shape.polygon->drag;
-    return {area * of_form.measure, area * of_form.moment};
+    return scaled<2>(shape.polygon->drag, shape.scale);
   }
 
   template <int D> static double outer_radius(const Shape &shape)
@@ -265,14 +256,9 @@ struct SpheropolygonModel {
     return shape.polygon->corner.size() == 2 ? director<2>(shape) : std::nullopt;
   }
 
-  /// The body axis about which area lies closest, if there is one.
   template <int D> static std::optional<int> director(const Shape &shape)
   {
-    constexpr double ISOTROPIC = 1e-6;  // relative difference of moments that rounding leaves
-    const Vec<3> &moment = shape.polygon->drag.moment;
-    const int least = moment[0] < moment[1] ? 0 : 1;
-    const bool is_long = moment[least] < (1.0 - ISOTROPIC) * moment[1 - least];
-    return is_long ? std::optional<int>(least) : std::nullopt;
+    return long_axis_of<2>(shape.polygon->drag.moment);
   }
 
   template <int D, class S = double> static Body<D, S> body(const Shape &shape)

@@ -90,7 +90,6 @@ class Packing(Record):
             if real_numbers(name, getattr(self, name)).size == 0:
                 object.__setattr__(self, name, np.zeros(shape))
         floats = {"position": vector, "orientation": rotation, "diameters": (n, 3), **rests}
-        floats["form"] = (n, *np.shape(self.form)[1:])
         for name, shape in floats.items():
             object.__setattr__(self, name, as_floats(name, getattr(self, name), shape))
         for name, shape in (("species", (n,)), ("id", (n,)), ("image", vector)):
@@ -311,7 +310,8 @@ def _form_of(packing: Packing, exponent: FloatArray | None, n: int) -> FloatArra
     given = real_numbers("form", packing.form)
     if given.size == 0:
         return shape.form_of_exponents(np.ones(n))
-    return as_floats("form", packing.form, (n, *given.shape[1:2]))
+    columns = given.shape[1] if given.ndim == 2 else 1
+    return as_floats("form", packing.form, (n, columns))
 
 
 def _check_labels(packing: Packing) -> None:

@@ -17,7 +17,7 @@ from jamshape.arrays import FloatArray
 from jamshape.shapes.level_set import level_set_mesh
 from jamshape.shapes.mesh import SurfaceMesh, arc
 from jamshape.shapes.principal import Moments, is_principal, principal, rows_of, text_of
-from jamshape.shapes.shape import MOST_NUMBERS, Parameter, Shape
+from jamshape.shapes.shape import MOST_NUMBERS, FormedShape, Parameter
 from jamshape.shapes.solid import Balls
 
 _WIDTH = 4  # numbers of a disc: x y z r
@@ -85,7 +85,7 @@ def _half_extents(rows: FloatArray) -> FloatArray:
 _TRIMER = text_of(np.array([[2, 0, 0, 0], [-1, 3**0.5, 0, 0], [-1, -(3**0.5), 0, 0]]) / 12**0.5 + [0, 0, 0, 0.5])  # fmt: skip
 
 
-class Clump(Shape):
+class Clump(FormedShape):
     """Clumps: rigid unions of discs (balls in 3D) of any radii at any places, overlapping or apart.
 
     Every pair of discs has the harmonic law of the overlap 1 - r/d. Bodies lie with their centre of area (volume) at the
@@ -96,19 +96,12 @@ class Clump(Shape):
     parameters = (
         Discs("discs", _TRIMER, "x y r of each disc, or x y z r of each ball: rows, text such as '0 0 1/1 0 0.5', or the name of a file", "discs", None),
     )  # fmt: skip
-    unit = "s"
-    size_ratio = 1.4
-    has_form = True
+    form_rule = "x y z r of the discs"
     examples = (
         {"discs": _TRIMER},
         {"discs": text_of(np.array([[-0.35, 0, 0, 0.5], [0.35, 0, 0, 0.5]]))},
         {"discs": text_of(np.array([[x, y, 0, 0.45] for x in (-0.4, 0.4) for y in (-0.3, 0.3)]))},
     )
-
-    def form_of_exponents(self, exponent: FloatArray) -> FloatArray:
-        """See `Shape.form_of_exponents`: there is no usual form."""
-        msg = f"form of {len(exponent)} clumps is missing, expected x y z r of the discs of each"
-        raise ValueError(msg)
 
     def check_form(self, form: FloatArray, dimension: int) -> None:
         """See `Shape.check_form`."""
@@ -119,14 +112,6 @@ class Clump(Shape):
         if dimension == 2 and form[:, 2::_WIDTH].any():
             msg = "form of a clump in the plane has discs off z = 0, expected all at 0"
             raise ValueError(msg)
-
-    def fits(self, diameters: FloatArray) -> bool:
-        """See `Shape.fits`; proportions depend on the form, and are checked with it."""
-        return bool((diameters > 0).all())
-
-    def rule(self) -> str:
-        """See `Shape.rule`."""
-        return "those of the box around its discs"
 
     def sizes(
         self, parameters: Mapping[str, Any], size: FloatArray

@@ -394,6 +394,29 @@ class Shape(ABC):
         return "_".join([self.name, *numbers])
 
 
+class FormedShape(Shape):
+    """A shape of particles that are given by points, such as discs or corners, and a factor of their size."""
+
+    unit = "s"
+    size_ratio = 1.4
+    has_form = True
+    form_rule: ClassVar[str]
+    """Describes the numbers of its form."""
+
+    def form_of_exponents(self, exponent: FloatArray) -> FloatArray:
+        """See `Shape.form_of_exponents`: there is no usual form."""
+        msg = f"form of {len(exponent)} {self.name}s is missing, expected {self.form_rule} of each"
+        raise ValueError(msg)
+
+    def fits(self, diameters: FloatArray) -> bool:
+        """See `Shape.fits`; proportions depend on the form, and are checked with it."""
+        return bool((diameters > 0).all())
+
+    def rule(self) -> str:
+        """See `Shape.rule`."""
+        return "those of the box around it"
+
+
 # Diameters that differ by less are equal up to rounding.
 _ROUNDING = 1e-12
 

@@ -17,7 +17,7 @@ from jamshape.arrays import FloatArray
 from jamshape.checks import Range
 from jamshape.shapes.mesh import SurfaceMesh, arc
 from jamshape.shapes.principal import principal, rows_of, text_of
-from jamshape.shapes.shape import MOST_NUMBERS, Interaction, Parameter, Shape, in_name
+from jamshape.shapes.shape import MOST_NUMBERS, FormedShape, Interaction, Parameter, in_name
 from jamshape.shapes.solid import RoundedPolygon
 
 
@@ -79,7 +79,7 @@ _SQUARE = text_of(regular_polygon(4).round(15))
 _TRIANGLE = text_of(regular_polygon(3))
 
 
-class Spheropolygon(Shape):
+class Spheropolygon(FormedShape):
     """Rounded polygons: all points within a radius of a convex polygon, in the plane.
 
     One corner makes a disc, two a spherocylinder. Two sides in contact have the law of spherocylinders, with one or two
@@ -94,9 +94,7 @@ class Spheropolygon(Shape):
             Range(1e-6, 1e6, "a radius"),
         ),
     )  # fmt: skip
-    unit = "s"
-    size_ratio = 1.4
-    has_form = True
+    form_rule = "a rounding radius and x y of the corners"
     dimensions = (2,)
     examples = (
         {"corners": _TRIANGLE, "rounding": 0.4},
@@ -104,11 +102,6 @@ class Spheropolygon(Shape):
         {"corners": "-1.0 -0.3/1.0 -0.3/1.0 0.3/-1.0 0.3", "rounding": 0.2},
         {"corners": "-0.5 0.0/0.5 0.0", "rounding": 0.5},
     )
-
-    def form_of_exponents(self, exponent: FloatArray) -> FloatArray:
-        """See `Shape.form_of_exponents`: there is no usual form."""
-        msg = f"form of {len(exponent)} spheropolygons is missing, expected a rounding radius and x y of the corners of each"
-        raise ValueError(msg)
 
     def check_form(self, form: FloatArray, dimension: int) -> None:
         """See `Shape.check_form`."""
@@ -121,14 +114,6 @@ class Spheropolygon(Shape):
         if columns % 2 == 0 or columns > MOST_NUMBERS:
             msg = f"form has {columns} columns, expected a rounding radius and x y of each corner of a spheropolygon"
             raise ValueError(msg)
-
-    def fits(self, diameters: FloatArray) -> bool:
-        """See `Shape.fits`; proportions depend on the form, and are checked with it."""
-        return bool((diameters > 0).all())
-
-    def rule(self) -> str:
-        """See `Shape.rule`."""
-        return "those of the box around it"
 
     def sizes(
         self, parameters: Mapping[str, Any], size: FloatArray
