@@ -156,7 +156,10 @@ def free_of_shared_bonds(packing):
     bonds = network.bonds
     across = bonds.force - (bonds.force * bonds.normal).sum(axis=1, keepdims=True) * bonds.normal
     along = np.linalg.norm(bonds.force, axis=1)
-    shared = np.linalg.norm(across, axis=1) > 1e-9 * along
+    overlap = (bonds.reach - bonds.distance) / bonds.reach
+    whole = packing.law.k_e * overlap / bonds.reach  # the force of a bond that shares no energy
+    is_part = (network.n_bonds[bonds.contact] > 1) & (np.abs(along - whole) > 1e-9 * whole)
+    shared = is_part | (np.linalg.norm(across, axis=1) > 1e-9 * along)
     found = np.ones((packing.n, 1))
     found[network.pairs[bonds.contact[shared]].ravel()] = 0
     D = packing.dimension
