@@ -92,7 +92,7 @@ template <class Model> class PairContactOf : public PairContact {
   bool has_current_contacts() const override
   {
     const std::size_t known = domain->dimension == 2 ? in_2d.now.size() : in_3d.now.size();
-    return list != nullptr && chosen_at == neighbor->lastcall && chosen_of == list->inum &&
+    return chosen_of >= 0 && chosen_at == neighbor->lastcall && chosen_of == list->inum &&
            known == static_cast<std::size_t>(n_all());
   }
 
@@ -192,7 +192,7 @@ template <class Model> class PairContactOf : public PairContact {
   Bodies<3> in_3d;
   double margin = 0.0, n_listed = 0.0;
   LAMMPS_NS::bigint chosen_at = -1;  // step of the list that pairs were chosen from
-  int chosen_of = -1;                // length of that list
+  int chosen_of = -1;                // length of that list, which LAMMPS leaves unset before one
   double shapes_read = -1.0;         // when the run began in which shapes were last read
   std::uint64_t shapes = 0;          // their checksum
   bool packs_take_all = false;
