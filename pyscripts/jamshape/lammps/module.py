@@ -6,6 +6,7 @@ import ctypes
 import functools
 import locale
 import os
+import re
 import threading
 import warnings
 from collections.abc import Iterator
@@ -172,8 +173,7 @@ def sentence_of(error: Exception) -> str:
     first = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
     for words in _AROUND:
         first = first.removeprefix(words)
-    text, bracket, place = first.rpartition(" (")
-    return text if bracket and ".cpp:" in place else first
+    return re.sub(r" \(\S+\.(?:cpp|h|hpp):\d+\)$", "", first)
 
 
 def _load_mpi_of_wheel(package: Path) -> None:
