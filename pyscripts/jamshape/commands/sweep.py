@@ -19,8 +19,8 @@ import fcntl
 import os
 import sys
 import time
-from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
-from collections.abc import Iterator
+from argparse import Action, ArgumentError, ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
 from io import StringIO
 from pathlib import Path
@@ -83,6 +83,19 @@ class _Parser(ArgumentParser):
             parser.parse_args(arguments_of(particle, 1, options))
 
 
+class _Parameters(Action):
+    """Reads the parameters of a shape, numbers and texts, and collects them by name."""
+
+    def __call__(self, parser: Any, namespace: Any, values: Any, option_string: Any = None) -> None:
+        del parser, option_string
+        shape = SHAPES[self.dest]
+        try:
+            read = {p.name: p.told(v) for p, v in zip(shape.parameters, values, strict=True)}
+        except ValueError as error:
+            raise ArgumentError(self, str(error)) from error
+        setattr(namespace, self.dest, [*getattr(namespace, self.dest), read])
+
+
 def options_of() -> ArgumentParser:
     """Make the parser; unknown options go to each packing."""
     parser = _Parser(
@@ -98,9 +111,8 @@ def options_of() -> ArgumentParser:
     for shape in SHAPES.values():
         parser.add_argument(
             f"--{shape.name}",
-            type=float,
             nargs=len(shape.parameters),
-            action="append",
+            action=_Parameters,
             default=[],
             metavar=tuple(p.option.upper() for p in shape.parameters),
             help=f"{', '.join(p.meaning for p in shape.parameters)}; may be given several times",
@@ -140,9 +152,7 @@ def particles(options: Namespace) -> list[Particle]:
     shape = shape_named(options.shape or DEFAULT)
     found = [particle_of(shape, {"alpha": alpha}) for alpha in options.alpha]
     for other in SHAPES.values():
-        names = [p.name for p in other.parameters]
-        given = getattr(options, other.name)
-        found += [particle_of(other, dict(zip(names, v, strict=True))) for v in given]
+        found += [particle_of(other, given) for given in getattr(options, other.name)]
     if options.kind:
         kinds = [text for kind in options.kind for text in ("--kind", kind)]
         told = ["--shape", shape.name, *kinds]
@@ -150,13 +160,14 @@ def particles(options: Namespace) -> list[Particle]:
     return list({particle.name: particle for particle in found}.values())
 
 
-def particle_of(shape: Shape, parameters: dict[str, float]) -> Particle:
+def particle_of(shape: Shape, parameters: Mapping[str, Any]) -> Particle:
     """Name particles of a shape."""
     told, asked = ["--shape", shape.name], [f"--{shape.name}"]
     for parameter in shape.parameters:
-        number = repr(parameters[parameter.name])
-        told += [f"--{parameter.option}", number]
-        asked.append(number)
+        value = parameters[parameter.name]
+        text = value if isinstance(value, str) else repr(value)
+        told += [f"--{parameter.option}", text]
+        asked.append(text)
     return Particle(shape.stem(parameters), told, asked)
 
 

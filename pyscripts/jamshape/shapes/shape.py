@@ -52,6 +52,10 @@ class Parameter(NamedTuple):
             require_in(self.option, value, self.allowed)
         return float(value)
 
+    def told(self, text: str) -> float | str:
+        """Read a word of a command line, or raise a ValueError."""
+        return self.read(text if self.allowed is None else float(text))
+
     @property
     def usual(self) -> str:
         """The default, for help."""
