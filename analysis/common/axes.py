@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 # Distance of discs from the smallest other alpha on a logarithmic axis, as a factor.
 DISCS_LEFT_BY = 4.0
 
+ASPHERICITY = r"asphericity $\mathcal{A}-1$,  $\mathcal{A}=p^2/4\pi a$"
+"""Label of an axis, in the plane."""
+
 SMALL_TEXT: dict[str, Any] = {"fontsize": 8, "title_fontsize": 8}
 
 _BETA_TICKS = (0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5, 10)

@@ -20,9 +20,6 @@ NEEDS = ("exponent", "w1", "w2")
 
 SPHERES = "spheres"
 
-# Self-dual ellipsoids have a beta this near to 1.
-_DUAL = 0.02
-
 # Colours distinguishable with any colour vision.
 _FAMILIES: dict[str, tuple[str, str]] = {
     SPHERES: ("*", BLACK),
@@ -31,6 +28,16 @@ _FAMILIES: dict[str, tuple[str, str]] = {
     "self-dual ellipsoids": ("^", GREEN),
     "general ellipsoids": ("v", SKY),
     "superballs": ("D", ORANGE),
+    "discs": ("*", BLACK),
+    "ellipses": ("s", BLUE),
+    "superellipses": ("D", ORANGE),
+    "spherocylinders": ("o", RED),
+    "dimers": ("P", GREEN),
+    "asymmetric dimers": ("X", SKY),
+    "dumbbells": ("d", "#CC79A7"),
+    "rounded triangles": ("^", "#882255"),
+    "rounded quadrangles": ("h", "#6B4C9A"),
+    "rounded polygons": ("p", "#8B5A2B"),
 }
 _OF_EXPONENTS = {
     0.75: ("p", "#CC79A7"),
@@ -72,15 +79,10 @@ def is_axisymmetric(system: System) -> bool:
 
 def family(system: System) -> str:
     """Name the family of shapes."""
-    p, w1, w2 = shape_of(system)
-    if not set(NEEDS) <= dict(system.parameters).keys():
-        return f"{system.shape}s"
-    if p != 1:
-        return "superballs" if w1 == w2 == 1 else f"$p={p:g}$"
-    if w1 == 1 or w2 == 1:
-        which = {(True, True): SPHERES, (False, True): "oblate ellipsoids"}
-        return which.get((w1 == 1, w2 == 1), "prolate ellipsoids")
-    return "self-dual ellipsoids" if abs(w1 * w2 - 1) < _DUAL else "general ellipsoids"
+    shape = SHAPES[system.shape]
+    if {parameter.name for parameter in shape.parameters} <= dict(system.parameters).keys():
+        return shape.family(dict(system.parameters), system.dimension)
+    return f"{system.shape}s"
 
 
 def is_thermal(system: System) -> bool:

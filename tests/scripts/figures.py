@@ -20,7 +20,9 @@ def require_told(script, figure):
     assert re.search(r"N=\d", said), f"{script} does not tell N"
     assert any(name in said for name in CONDITIONS), f"{script} tells neither u0 nor kappa"
     assert re.search(r"\w+s in [23]D", said), f"{script} does not tell the shape"
-    assert re.search(r"(alpha|w_1) ?=|percent| \\%", said), f"{script} does not tell the parameters"
+    assert re.search(r"(alpha|w_1) ?=|percent| \\%|A}=p\^2", said), (
+        f"{script} does not tell the parameters"
+    )
     assert not unnamed(figure), f"{script} has colours without a name"
 
 

@@ -59,7 +59,7 @@ class Packing(PackingLike):
     image : (N, D) array of int64, optional
         Periodic image counts; zeros by default.
     shape_style : str
-        ``"spherocylinder"``, ``"superellipsoid"`` or ``"dimer"``.
+        ``"spherocylinder"``, ``"superellipsoid"``, ``"dimer"``, ``"clump"`` or ``"spheropolygon"``.
     form : (N, K) array of float64, optional
         Numbers beside the diameters, for shapes that have some: the exponent of superellipsoids.
     exponent : (N,) array of float64, optional
@@ -123,7 +123,7 @@ class Packing(PackingLike):
         Parameters
         ----------
         shape : str
-            ``"spherocylinder"``, ``"superellipsoid"`` or ``"dimer"``.
+            ``"spherocylinder"``, ``"superellipsoid"``, ``"dimer"``, ``"clump"`` or ``"spheropolygon"``.
         position : (N, D) array_like, [length]
         orientation : (N,) or (N, 4) array_like, optional
             Angle of the body's x axis in radians in 2D, unit quaternion w i j k in 3D. Only round particles need none.

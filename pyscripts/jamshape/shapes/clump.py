@@ -17,7 +17,7 @@ from jamshape.arrays import FloatArray
 from jamshape.shapes.level_set import level_set_mesh
 from jamshape.shapes.mesh import SurfaceMesh, arc
 from jamshape.shapes.principal import Moments, is_principal, principal, rows_of, text_of
-from jamshape.shapes.shape import MOST_NUMBERS, FormedShape, Parameter
+from jamshape.shapes.shape import MOST_NUMBERS, ROUND, FormedShape, Parameter
 from jamshape.shapes.solid import Balls
 
 _WIDTH = 4  # numbers of a disc: x y z r
@@ -164,6 +164,18 @@ class Clump(FormedShape):
         rows = self._placed_discs(diameters, form)
         return Balls(rows[:, :3], rows[:, 3])
 
+    def family(self, parameters: Mapping[str, Any], dimension: int) -> str:
+        """See `Shape.family`."""
+        rows = _rows(parameters["discs"])
+        radii = rows[:, -1]
+        if len(rows) == 1:
+            return ROUND[dimension]
+        if len(rows) > 2:
+            return f"clumps of {len(rows)}"
+        if np.linalg.norm(rows[1, :-1] - rows[0, :-1]) > radii.sum():
+            return "dumbbells"
+        return "dimers" if radii[0] == radii[1] else "asymmetric dimers"
+
     def label(self, parameters: Mapping[str, Any]) -> str:
         """See `Shape.label`."""
         n = len(_rows(parameters["discs"]))
@@ -194,9 +206,13 @@ def _joined(pieces: list[FloatArray]) -> FloatArray:
             away = np.linalg.norm(begins - ends[at], axis=1)
             at = int(away.argmin())
         curves.append(np.concatenate(curve))
-    first = curves[0]
-    around = [np.concatenate([other, other[:1], first[:1]]) for other in curves[1:]]
-    return np.concatenate([first, first[:1] if around else first[:0], *around])
+    joined = curves[0]
+    for other in curves[1:]:
+        away = np.linalg.norm(joined[:, None] - other, axis=2)
+        at, begin = np.unravel_index(away.argmin(), away.shape)
+        around = np.roll(other, -begin, axis=0)
+        joined = np.concatenate([joined[: at + 1], around, around[:1], joined[at:]])
+    return joined
 
 
 @checked

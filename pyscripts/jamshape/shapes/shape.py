@@ -387,6 +387,11 @@ class Shape(ABC):
         del diameters
         return 0.0
 
+    def family(self, parameters: Mapping[str, Any], dimension: int) -> str:
+        """Name the family of shapes that particles of these parameters belong to, for a legend."""
+        del parameters, dimension
+        return f"{self.name}s"
+
     def label(self, parameters: Mapping[str, Any]) -> str:
         """Format parameters in TeX, for a legend."""
         told = [f"{p.symbol}={parameters[p.name]:g}" for p in self.parameters]
@@ -420,6 +425,9 @@ class FormedShape(Shape):
         """See `Shape.rule`."""
         return "those of the box around it"
 
+
+ROUND = {2: "discs", 3: "spheres"}
+"""Families of round particles by dimension."""
 
 # Diameters that differ by less are equal up to rounding.
 _ROUNDING = 1e-12

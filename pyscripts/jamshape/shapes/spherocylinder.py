@@ -11,7 +11,7 @@ import numpy as np
 
 from jamshape.arrays import FloatArray
 from jamshape.shapes.mesh import SurfaceMesh, arc, revolved
-from jamshape.shapes.shape import ElongatedShape, Interaction, in_name
+from jamshape.shapes.shape import ROUND, ElongatedShape, Interaction, in_name
 from jamshape.shapes.solid import RoundedSegment
 
 
@@ -27,6 +27,12 @@ class Spherocylinder(ElongatedShape):
     def style_name(self, law: Interaction) -> str:
         """See `Shape.style_name`; each law of two rods side by side is a setting."""
         return f"{self.name}/harmonic sides {('one', 'two')[law.sides - 1]}"
+
+    def family(self, parameters: Mapping[str, float], dimension: int) -> str:
+        """See `Shape.family`."""
+        return (
+            super().family(parameters, dimension) if parameters["alpha"] > 0 else ROUND[dimension]
+        )
 
     def stem(self, parameters: Mapping[str, float]) -> str:
         """See `Shape.stem`."""

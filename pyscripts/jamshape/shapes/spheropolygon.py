@@ -17,7 +17,14 @@ from jamshape.arrays import FloatArray
 from jamshape.checks import Range
 from jamshape.shapes.mesh import SurfaceMesh, arc
 from jamshape.shapes.principal import principal, rows_of, text_of
-from jamshape.shapes.shape import MOST_NUMBERS, FormedShape, Interaction, Parameter, in_name
+from jamshape.shapes.shape import (
+    MOST_NUMBERS,
+    ROUND,
+    FormedShape,
+    Interaction,
+    Parameter,
+    in_name,
+)
 from jamshape.shapes.solid import RoundedPolygon
 
 
@@ -176,6 +183,17 @@ class Spheropolygon(FormedShape):
     def style_name(self, law: Interaction) -> str:
         """See `Shape.style_name`; each law of two sides is a setting."""
         return f"{self.name}/harmonic sides {('one', 'two')[law.sides - 1]}"
+
+    def family(self, parameters: Mapping[str, Any], dimension: int) -> str:
+        """See `Shape.family`."""
+        n = len(_corners_told(parameters["corners"]))
+        names = {
+            1: ROUND[dimension],
+            2: "spherocylinders",
+            3: "rounded triangles",
+            4: "rounded quadrangles",
+        }
+        return names.get(n, "rounded polygons")
 
     def label(self, parameters: Mapping[str, Any]) -> str:
         """See `Shape.label`."""

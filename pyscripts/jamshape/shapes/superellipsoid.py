@@ -13,13 +13,12 @@ from jamshape.arrays import FloatArray
 from jamshape.checks import Range
 from jamshape.shapes.mesh import SurfaceMesh, arc
 from jamshape.shapes.roundness import asphericity, axes_from, perimeter, reduced_aspect_ratio
-from jamshape.shapes.shape import (
-    Parameter,
-    Shape,
-    in_name,
-)
+from jamshape.shapes.shape import ROUND, Parameter, Shape, in_name
 from jamshape.shapes.solid import Superquadric
 from jamshape.shapes.superellipsoid_surface import surface_mesh
+
+# Self-dual ellipsoids have a beta this near to 1.
+_DUAL = 0.02
 
 
 class Superellipsoid(Shape):
@@ -103,6 +102,18 @@ class Superellipsoid(Shape):
     def perimeter(self, diameters: FloatArray, form: FloatArray) -> float:
         """See `Shape.perimeter`."""
         return perimeter(diameters[:2] / 2, float(form[0]))
+
+    def family(self, parameters: Mapping[str, float], dimension: int) -> str:
+        """See `Shape.family`; in space as in Yuan et al. (2019), Fig. 4."""
+        p, w1, w2 = (parameters[one.name] for one in self.parameters)
+        if dimension == 2:
+            return ("ellipses" if p == 1 else "superellipses") if w1 < 1 or p != 1 else ROUND[2]
+        if p != 1:
+            return "superballs" if w1 == w2 == 1 else f"$p={p:g}$"
+        if w1 == 1 or w2 == 1:
+            which = {(True, True): ROUND[3], (False, True): "oblate ellipsoids"}
+            return which.get((w1 == 1, w2 == 1), "prolate ellipsoids")
+        return "self-dual ellipsoids" if abs(w1 * w2 - 1) < _DUAL else "general ellipsoids"
 
     def stem(self, parameters: Mapping[str, float]) -> str:
         """See `Shape.stem`."""
