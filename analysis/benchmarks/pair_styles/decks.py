@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import subprocess
 import sys
 from collections.abc import Callable
@@ -98,7 +99,7 @@ def state(work: Path, bench: Bench, particles: str, phi: float, n: int) -> Packi
     path = work / f"{tag}_{phi:g}_{n}.h5"
     if not (path.exists() and read_attributes(path).get("finished")):
         told = f"{particles} {bench.compress} --dimension {bench.dimension} --n {n} --phi-end {phi}"
-        command = [sys.executable, f"{ROOT}/pyscripts/compress.py", *told.split()]
+        command = [sys.executable, f"{ROOT}/pyscripts/compress.py", *shlex.split(told)]
         silent = subprocess.DEVNULL
         subprocess.run([*command, "--out", str(path)], check=True, stdout=silent)
     return read_packing(path)

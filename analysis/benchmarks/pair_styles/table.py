@@ -6,14 +6,23 @@ import re
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
+from jamshape.arrays import FloatArray
 from jamshape.files.lammps_text import write_data
 from jamshape.packing import Packing
+from jamshape.shapes.clump import bumpy_discs
+from jamshape.shapes.principal import text_of
+from jamshape.shapes.solid import RoundedSegment
+from jamshape.shapes.spheropolygon import regular_polygon
 from pair_styles.decks import SKIN, Bench, Case, Style, ours
 
 CONTACTS = {"1 1": 1.0, "1 2": 1.2, "2 2": 1.4}  # R_i + R_j of the types
 ELLIPSOIDS = "atom_style ellipsoid"
 
 _DISCS = "--alpha 0"
+_BUMPY = text_of(bumpy_discs(11))
+_SQUARE = text_of(regular_polygon(4).round(15))
 _FLIGHT = "velocity all create 1 1\nfix flow all nve/noforce\ntimestep 1.5e-3"
 
 
@@ -27,20 +36,36 @@ def reaching(text: str, packing: Packing) -> str:
     return text.format(reach=2 * float(packing.outer_radius.max()))
 
 
-def write_other(path: Path, packing: Packing, *, rods: bool) -> None:
-    """Write a data file for `atom_style body rounded/polygon 1 2` or, of discs, `atomic`."""
+def corners_of(packing: Packing, i: int) -> tuple[FloatArray, float]:
+    """Corners of a rounded body in the plane in its own coordinates, and its radius."""
+    solid = packing.shape.solid(packing.diameters[i], packing.form[i])
+    if isinstance(solid, RoundedSegment):
+        return np.array([[1.0, 0.0], [-1.0, 0.0]]) * solid.half_length, solid.radius
+    return solid.corners, solid.radius
+
+
+def write_other(path: Path, packing: Packing, *, bodies: bool) -> None:
+    """Write a data file for `atom_style body rounded/polygon` or, of discs, `atomic`."""
     write_data(path, packing)
     head, _, text = path.read_text().partition("Atoms # ellipsoid")
     atoms = text.partition("\nEllipsoids")[0]
-    if rods:
-        text = f"Atoms{atoms}\nBodies\n\n"
-        ends, R = packing.half_length[:, None] * packing.axes, packing.radius
-        for i, (x, y), diameter in zip(packing.id, ends.tolist(), (2 * R).tolist(), strict=True):
-            text += f"{i} 1 13\n2\n1 1 2 0 0 0\n{x} {y} 0 {-x} {-y} 0 {diameter}\n"
+    if bodies:
+        every = [body_lines(packing, i) for i in range(packing.n)]
+        text = "\n".join([f"Atoms{atoms}\nBodies\n", *every, ""])
     else:
         text = "Masses\n\n1 1\n2 1\n\nAtoms" + re.sub(r"(?m)^(\d+ \d) 1 1 ", r"\1 ", atoms)
-    head = head.replace(f"{packing.n} ellipsoids", f"{packing.n} bodies" if rods else "")
+    head = head.replace(f"{packing.n} ellipsoids", f"{packing.n} bodies" if bodies else "")
     path.write_text(head + text)
+
+
+def body_lines(packing: Packing, i: int) -> str:
+    """Write a body of unit moments of inertia for `Bodies`: corners in space, and the diameter."""
+    corners, radius = corners_of(packing, i)
+    along = packing.axes[i]
+    turned = corners @ np.array([along, [-along[1], along[0]]])
+    places = " ".join(f"{x} {y} 0" for x, y in turned.tolist())
+    n = len(corners)
+    return f"{packing.id[i]} 1 {7 + 3 * n}\n{n}\n1 1 2 0 0 0\n{places} {2 * radius}"
 
 
 POLYGON = Style(
@@ -48,7 +73,7 @@ POLYGON = Style(
     atoms="atom_style body rounded/polygon 1 2\ncomm_modify vel yes",
     # No damping, friction or attraction, and no force that grows with the length of contact.
     pair=partial(fixed, "pair_style body/rounded/polygon 0 0 0 1e9 0\npair_coeff * * 1 0"),
-    write=partial(write_other, rods=True),
+    write=partial(write_other, bodies=True),
     nve="fix flow all nve/body\ntimestep 1e-6",
     skin=SKIN + max(CONTACTS.values()),  # its cutoff leaves out the radii: contacts would be lost
 )
@@ -59,7 +84,7 @@ WCA = Style(
         "pair_style lj/cut 1\n"
         + "\n".join(f"pair_coeff {ij} 1 {d} {d * 2 ** (1 / 6)}" for ij, d in CONTACTS.items()),
     ),
-    write=partial(write_other, rods=False),
+    write=partial(write_other, bodies=False),
     nve="fix flow all nve\ntimestep 1e-6",
     instead=_DISCS,
 )
@@ -101,6 +126,26 @@ BENCHES = {
         cases=(Case("alpha 1", "--shape dimer --alpha 1", (0.5, 0.86)),),
         styles={"ours": ours(2, ELLIPSOIDS, _SLOWLY), "wca": WCA},
         dearer_than={"cost over wca": "wca"},
+    ),
+    "clump": _PLANE._replace(
+        cases=(Case("bumpy, 12 discs", f"--shape clump --discs '{_BUMPY}'", (0.5, 0.82)),),
+        styles={
+            "ours": ours(2, ELLIPSOIDS, _SLOWLY),
+            "ours-dimer": ours(2, ELLIPSOIDS, _SLOWLY)._replace(instead="--shape dimer --alpha 1"),
+            "wca": WCA,
+        },
+        dearer_than={"cost over dimers (<= 6)": "ours-dimer", "cost over wca": "wca"},
+    ),
+    "spheropolygon": _PLANE._replace(
+        cases=(Case("squares", f"--shape spheropolygon --corners '{_SQUARE}' --rounding 0.3", (0.5, 0.86)),),
+        styles={
+            "ours": ours(2, ELLIPSOIDS, _SLOWLY),
+            "ours-rod": ours(2, ELLIPSOIDS, _SLOWLY)._replace(instead="--alpha 1"),
+            "polygon": POLYGON._replace(atoms="atom_style body rounded/polygon 1 4\ncomm_modify vel yes"),
+            "wca": WCA,
+        },
+        faster_than={"speed over polygon": "polygon"},
+        dearer_than={"cost over rods (<= 3)": "ours-rod", "cost over wca": "wca"},
     ),
     "superellipsoid": Bench(
         dimension=3,
