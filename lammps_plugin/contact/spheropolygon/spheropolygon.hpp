@@ -2,9 +2,11 @@
 
 #include "contact/compiled_once.hpp"
 #include "contact/contact.hpp"
+#include "contact/instruction_set.hpp"
 #include "contact/math/region.hpp"
 #include "contact/math/rotation.hpp"
 #include "contact/math/vec.hpp"
+#include "contact/packs.hpp"
 #include "contact/spherocylinder/spherocylinder.hpp"
 #include "contact/spheropolygon/form.hpp"
 
@@ -74,13 +76,19 @@ template <int D, class T> struct FacingSides {
 
   FacingSides(const SpheropolygonBody<D, T> &of, const SpheropolygonBody<D, T> &other, T reach)
   {
+    // In the coordinates and the unit of the body.
     const Vec<D, T> away = other.centre - of.centre;
-    reach += other.core_radius();
+    const T unit = T(1.0) / of.scale;
+    const T x = unit * (of.axis[0] * away[0] + of.axis[1] * away[1]);
+    const T y = unit * (of.axis[0] * away[1] - of.axis[1] * away[0]);
+    reach = unit * (reach + other.core_radius());
     for (int k = 0; k < of.n(); ++k) {
-      const Spine one{k, of.middle(k), of.along(k), of.half_length(k)};
-      const Vec<D, T> from = away - one.middle;
-      const Vec<D, T> off = from - limited(dot(from, one.along), one.half_length) * one.along;
-      if (norm_sq(off) < reach * reach) spine[n++] = one;
+      const auto &side = of.polygon->side[k];
+      const T from_x = x - side.middle[0], from_y = y - side.middle[1];
+      const T at = limited(from_x * side.along[0] + from_y * side.along[1], T(side.half_length));
+      const T off_x = from_x - at * side.along[0], off_y = from_y - at * side.along[1];
+      if (off_x * off_x + off_y * off_y < reach * reach)
+        spine[n++] = {k, of.middle(k), of.along(k), of.half_length(k)};
     }
   }
 };
@@ -214,6 +222,7 @@ struct SpheropolygonModel {
   {
     return {{k_e}, sides, shortcuts};
   }
+  static double k_e(const Law &law) { return law.harmonic.k_e; }
 
   static std::optional<Shape> shape_from(const Vec<3> &semi_axes, const Form &form)
   {
@@ -313,6 +322,22 @@ struct SpheropolygonModel {
   {
     static const auto one = std::make_shared<const RoundedPolygon>(1.0, std::vector<Vec<2>>{{}});
     return one;
+  }
+};
+
+/// Compiled in packs.cpp for each instruction set: the sides in packs of rods.
+template <InstructionSet SET>
+void find_polygon_contacts(const SpheropolygonBody<2> *bodies, const SpherocylinderLaw &law,
+                           ContactBlock<2> &block);
+
+template <> struct PacksOf<SpheropolygonModel, 2> {
+  static constexpr bool EXIST = true, CHOOSE = false;
+  static bool take(const Spheropolygon &, const Spheropolygon &) { return true; }
+
+  static FindContacts<SpheropolygonModel, 2> *of(InstructionSet set)
+  {
+    return compiled_for(set,
+                        [](auto one) { return &find_polygon_contacts<decltype(one)::value>; });
   }
 };
 
