@@ -10,7 +10,9 @@ from pair_packings import PairPacking, rods
 from spherocylinder_pairs import concatenated, disc_to_disc, overlaps
 from test_fuzz import kinds_of_rods
 
+import jamshape as js
 from jamshape import _contact
+from jamshape.landscape import Landscape, State
 
 K_E = 1.3
 N = 333
@@ -91,6 +93,38 @@ def test_packs_of_superellipsoids_give_what_pairs_give_alone(
     """To what their iterations leave open: near faces a lever moves by the root of it."""
     packing = superellipsoids(np.random.default_rng([4, dimension]), dimension, p)
     compare(monkeypatch, instructions, packing, 1, rounding=1e-11)
+
+
+POLYGONS = {
+    "squares": {"rounding": 0.3},
+    "triangles": {"corners": js.regular_polygon(3), "rounding": 0.4},
+    "20 corners": {"corners": js.regular_polygon(20), "rounding": 0.5},
+    "two corners": {"corners": "-0.5 0/0.5 0", "rounding": 0.5},
+    "discs": {"corners": "0 0", "rounding": 0.5},
+}
+
+
+@each_set
+@pytest.mark.parametrize("sides", [1, 2])
+@pytest.mark.parametrize("name", POLYGONS)
+def test_packs_of_polygons_give_what_pairs_give_alone(instructions, name, sides, monkeypatch):
+    shape = js.Spheropolygons(**POLYGONS[name])
+    packing = js.make_packing(shape, n=60, seed=1, u0=1e-6, progress=False)
+    law = packing.law.but(sides=sides)
+    packing = packing.with_(law=law, diameters=1.03 * packing.diameters)  # out of balance
+
+    def gradient(which):
+        monkeypatch.setenv("JAMSHAPE_SIMD", which)
+        return Landscape(packing).evaluate(State.of(packing), extended=False)
+
+    alone, found = gradient("scalar"), gradient(instructions)
+    assert found.n_bonds == alone.n_bonds > 50
+    atol = 1e-13 * np.abs(alone.gradient).max()
+    np.testing.assert_allclose(found.gradient, alone.gradient, rtol=0.0, atol=atol)
+    for name in ("energy", "bond_force", "virial"):
+        np.testing.assert_allclose(
+            getattr(found, name), getattr(alone, name), rtol=1e-12, atol=1e-18
+        )
 
 
 @pytest.mark.skipif(len(PACKS) < 2, reason="one set of instructions")

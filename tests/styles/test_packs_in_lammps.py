@@ -10,17 +10,29 @@ from lammps_runs import dump, load_plugin, run_lmp, run_lmp_well, scene, states_
 from lammps_scenes import dense, dense_mixture, pose_differences
 from superellipsoid_scenes import crowd
 
+import jamshape as js
 from jamshape import _contact
 
 pytestmark = pytest.mark.lammps
 
 PACKS = [name for name in _contact.instruction_sets() if name != "scalar"]
 FLOW = "fix move all overdamped/affine drag 1.0 compress 1e-4\ntimestep 0.01"
+
+
+@cache
+def squares():
+    """Overlapping, and out of balance."""
+    shape = js.Spheropolygons(rounding=0.3)
+    packing = js.make_packing(shape, n=48, seed=1, u0=1e-6, progress=False)
+    return packing.with_(diameters=1.03 * packing.diameters)
+
+
 SCENES = {
     "discs": lambda: dense(alpha=0.0),
     "rods": dense,
     "mixture": dense_mixture,
     "rods in space": lambda: dense(3),
+    "squares": squares,
     "spheroids": lambda: crowd(kinds=(1,)),
     "spheres": lambda: crowd(kinds=(2,)).with_(exponent=np.ones(48)),
     "superballs": lambda: crowd(kinds=(2,)).with_(exponent=np.full(48, 1.5)),
@@ -30,7 +42,7 @@ SCENES = {
 
 
 CASES = [(name, "two") for name in SCENES]
-CASES += [(name, "one") for name in ("discs", "rods", "mixture", "rods in space")]
+CASES += [(name, "one") for name in ("discs", "rods", "mixture", "rods in space", "squares")]
 
 
 @pytest.fixture(scope="module")
