@@ -34,7 +34,9 @@ Counts = dict[System, list[Constraints]]
 LINE: dict[str, Any] = {"ls": "--", "color": "0.5", "lw": 1, "zorder": 0}
 
 
-def draw(groups: Groups, counts: Counts, asphericity: dict[System, float], options: Namespace) -> None:
+def draw(
+    groups: Groups, counts: Counts, asphericity: dict[System, float], options: Namespace
+) -> None:
     """Draw both panels."""
     figure = figure_of(10.5, 4.4)
     left, right = figure.subplots(1, 2)

@@ -137,11 +137,19 @@ BENCHES = {
         dearer_than={"cost over dimers (<= 6)": "ours-dimer", "cost over wca": "wca"},
     ),
     "spheropolygon": _PLANE._replace(
-        cases=(Case("squares", f"--shape spheropolygon --corners '{_SQUARE}' --rounding 0.3", (0.5, 0.86)),),
+        cases=(
+            Case(
+                "squares",
+                f"--shape spheropolygon --corners '{_SQUARE}' --rounding 0.3",
+                (0.5, 0.86),
+            ),
+        ),
         styles={
             "ours": ours(2, ELLIPSOIDS, _SLOWLY),
             "ours-rod": ours(2, ELLIPSOIDS, _SLOWLY)._replace(instead="--alpha 1"),
-            "polygon": POLYGON._replace(atoms="atom_style body rounded/polygon 1 4\ncomm_modify vel yes"),
+            "polygon": POLYGON._replace(
+                atoms="atom_style body rounded/polygon 1 4\ncomm_modify vel yes"
+            ),
             "wca": WCA,
         },
         faster_than={"speed over polygon": "polygon"},

@@ -14,8 +14,7 @@ namespace {
 class SidePairs {
  public:
   SidePairs(FindContacts<SpherocylinderModel, 2> &find, const SpherocylinderLaw &of,
-            ContactBlock<2> &to) :
-      find_rods(find), law(of), block(to)
+            ContactBlock<2> &to) : find_rods(find), law(of), block(to)
   {
   }
 

@@ -336,8 +336,7 @@ template <> struct PacksOf<SpheropolygonModel, 2> {
 
   static FindContacts<SpheropolygonModel, 2> *of(InstructionSet set)
   {
-    return compiled_for(set,
-                        [](auto one) { return &find_polygon_contacts<decltype(one)::value>; });
+    return compiled_for(set, [](auto one) { return &find_polygon_contacts<decltype(one)::value>; });
   }
 };
 
