@@ -1,4 +1,4 @@
-"""What contacts constrain: first-order constraints, motions that they block to second order, and free motions.
+"""Constraints by contacts: first-order ones, motions blocked to second order, and motions that are free.
 
 A contact that forbids overlaps constrains one motion to first order, along the gradient of its gap. Along motions that
 leave the gap unchanged to first order, its second derivatives matter: where they are negative the gap closes, and

@@ -29,16 +29,21 @@ _FAMILIES: dict[str, tuple[str, str]] = {
     "general ellipsoids": ("v", SKY),
     "superballs": ("D", ORANGE),
     "discs": ("*", BLACK),
-    "ellipses": ("s", BLUE),
-    "superellipses": ("D", ORANGE),
-    "spherocylinders": ("o", RED),
-    "dimers": ("P", GREEN),
-    "asymmetric dimers": ("X", SKY),
-    "dumbbells": ("d", "#CC79A7"),
-    "rounded triangles": ("^", "#882255"),
-    "rounded quadrangles": ("h", "#6B4C9A"),
-    "rounded polygons": ("p", "#8B5A2B"),
 }
+_IN_PLANE = (
+    ("o", RED),
+    ("s", BLUE),
+    ("D", ORANGE),
+    ("P", GREEN),
+    ("X", SKY),
+    ("d", "#CC79A7"),
+    ("H", "#7b8fc7"),
+    ("^", "#882255"),
+    ("h", "#6B4C9A"),
+    ("p", "#8B5A2B"),
+)
+"""By place among `Shape.families` of all shapes."""
+
 _OF_EXPONENTS = {
     0.75: ("p", "#CC79A7"),
     0.85: ("h", "#882255"),
@@ -109,7 +114,9 @@ def mark(system: System) -> dict[str, Any]:
         _OF_EXPONENTS[p] for p in _OF_EXPONENTS if is_among(system.number(NEEDS[0]), [p])
     ]
     others = [*of_exponent, _OTHERS[place % len(_OTHERS)]]
-    marker, color = _FAMILIES.get(family(system), others[0])
+    flat = [name for shape in SHAPES.values() for name in shape.families]
+    known = _FAMILIES | dict(zip(flat, _IN_PLANE, strict=False))
+    marker, color = known.get(family(system), others[0])
     return {"marker": marker, "color": color, "mfc": color if is_thermal(system) else "none"}
 
 

@@ -15,7 +15,7 @@ def unit(angle):
     return np.array([np.cos(angle), np.sin(angle)])
 
 
-def disc_gap(r, turn_i, turn_j):
+def disc_gap(r, *_):
     """Of discs of diameter 1."""
     return np.hypot(*r) - 1
 

@@ -121,9 +121,9 @@ def test_packs_of_polygons_give_what_pairs_give_alone(instructions, name, sides,
     assert found.n_bonds == alone.n_bonds > 50
     atol = 1e-13 * np.abs(alone.gradient).max()
     np.testing.assert_allclose(found.gradient, alone.gradient, rtol=0.0, atol=atol)
-    for name in ("energy", "bond_force", "virial"):
+    for sum_of in ("energy", "bond_force", "virial"):
         np.testing.assert_allclose(
-            getattr(found, name), getattr(alone, name), rtol=1e-12, atol=1e-18
+            getattr(found, sum_of), getattr(alone, sum_of), rtol=1e-12, atol=1e-18
         )
 
 

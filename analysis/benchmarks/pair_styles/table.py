@@ -13,7 +13,7 @@ from jamshape.files.lammps_text import write_data
 from jamshape.packing import Packing
 from jamshape.shapes.clump import bumpy_discs
 from jamshape.shapes.principal import text_of
-from jamshape.shapes.solid import RoundedSegment
+from jamshape.shapes.solid import RoundedPolygon
 from jamshape.shapes.spheropolygon import regular_polygon
 from pair_styles.decks import SKIN, Bench, Case, Style, ours
 
@@ -39,9 +39,10 @@ def reaching(text: str, packing: Packing) -> str:
 def corners_of(packing: Packing, i: int) -> tuple[FloatArray, float]:
     """Corners of a rounded body in the plane in its own coordinates, and its radius."""
     solid = packing.shape.solid(packing.diameters[i], packing.form[i])
-    if isinstance(solid, RoundedSegment):
-        return np.array([[1.0, 0.0], [-1.0, 0.0]]) * solid.half_length, solid.radius
-    return solid.corners, solid.radius
+    if isinstance(solid, RoundedPolygon):
+        return solid.corners, solid.radius
+    half_length, radius = packing.half_length[i], float(packing.radius[i])
+    return np.array([[1.0, 0.0], [-1.0, 0.0]]) * half_length, radius
 
 
 def write_other(path: Path, packing: Packing, *, bodies: bool) -> None:

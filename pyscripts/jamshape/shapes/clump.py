@@ -93,6 +93,7 @@ class Clump(FormedShape):
     """
 
     name = "clump"
+    families = ("asymmetric dimers", "dumbbells", "clumps")
     parameters = (
         Discs("discs", _TRIMER, "x y r of each disc, or x y z r of each ball: rows, text such as '0 0 1/1 0 0.5', or the name of a file", "discs", None),
     )  # fmt: skip
@@ -170,11 +171,11 @@ class Clump(FormedShape):
         radii = rows[:, -1]
         if len(rows) == 1:
             return ROUND[dimension]
+        of_two, apart, others = self.families
         if len(rows) > 2:
-            return f"clumps of {len(rows)}"
-        if np.linalg.norm(rows[1, :-1] - rows[0, :-1]) > radii.sum():
-            return "dumbbells"
-        return "dimers" if radii[0] == radii[1] else "asymmetric dimers"
+            return others
+        is_apart = np.linalg.norm(rows[1, :-1] - rows[0, :-1]) > radii.sum()
+        return apart if is_apart else "dimers" if radii[0] == radii[1] else of_two
 
     def label(self, parameters: Mapping[str, Any]) -> str:
         """See `Shape.label`."""

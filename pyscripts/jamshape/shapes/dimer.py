@@ -21,6 +21,7 @@ class Dimer(ElongatedShape):
     """
 
     name = "dimer"
+    families = ("dimers",)
     # Coinciding discs would count as four bonds with each neighbour.
     parameters = (
         Parameter(

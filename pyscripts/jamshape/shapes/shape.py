@@ -216,6 +216,8 @@ class Shape(ABC):
     """Default dimension of packings."""
     size_ratio: ClassVar[float] = 1.0
     """Default size ratio; 1 for equal particles."""
+    families: ClassVar[tuple[str, ...]] = ()
+    """Families of particles in the plane, but for round ones."""
     has_form: ClassVar[bool] = False
     """Whether a particle is given by more than diameters and an exponent."""
     has_exponent: ClassVar[bool] = False

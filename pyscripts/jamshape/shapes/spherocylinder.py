@@ -22,6 +22,7 @@ class Spherocylinder(ElongatedShape):
     """
 
     name = "spherocylinder"
+    families = ("spherocylinders",)
     examples = ({"alpha": 4.0}, {"alpha": 0.01}, {"alpha": 0.0})
 
     def style_name(self, law: Interaction) -> str:

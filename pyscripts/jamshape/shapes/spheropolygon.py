@@ -94,6 +94,7 @@ class Spheropolygon(FormedShape):
     """
 
     name = "spheropolygon"
+    families = ("rounded triangles", "rounded quadrangles", "rounded polygons")
     parameters = (
         Corners("corners", _SQUARE, "x y of each corner: rows, text such as '0 0/1 0/0 1', or the name of a file", "corners", None),
         Parameter(
@@ -187,13 +188,8 @@ class Spheropolygon(FormedShape):
     def family(self, parameters: Mapping[str, Any], dimension: int) -> str:
         """See `Shape.family`."""
         n = len(_corners_told(parameters["corners"]))
-        names = {
-            1: ROUND[dimension],
-            2: "spherocylinders",
-            3: "rounded triangles",
-            4: "rounded quadrangles",
-        }
-        return names.get(n, "rounded polygons")
+        rounded = (ROUND[dimension], "spherocylinders", *self.families)
+        return rounded[min(n, len(rounded)) - 1]
 
     def label(self, parameters: Mapping[str, Any]) -> str:
         """See `Shape.label`."""

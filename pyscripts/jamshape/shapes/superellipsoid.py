@@ -29,6 +29,7 @@ class Superellipsoid(Shape):
     """
 
     name = "superellipsoid"
+    families = ("ellipses", "superellipses")
     parameters = (
         Parameter(
             "exponent", 1.0, "exponent p of the surface (Yuan et al. 2019, Eq. 1)", "p",
@@ -107,7 +108,7 @@ class Superellipsoid(Shape):
         """See `Shape.family`; in space as in Yuan et al. (2019), Fig. 4."""
         p, w1, w2 = (parameters[one.name] for one in self.parameters)
         if dimension == 2:
-            return ("ellipses" if p == 1 else "superellipses") if w1 < 1 or p != 1 else ROUND[2]
+            return self.families[p != 1] if w1 < 1 or p != 1 else ROUND[2]
         if p != 1:
             return "superballs" if w1 == w2 == 1 else f"$p={p:g}$"
         if w1 == 1 or w2 == 1:
