@@ -9,7 +9,8 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "docs" / "results"
-PAPERS = ("marschall-2018", "yuan-2019")
+PAPERS = {"marschall-2018": 10, "yuan-2019": 10, "vanderwerf-2018": 1}
+"""With more measured numbers than that."""
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +42,7 @@ def line_of(script, row):
 def test_every_number_that_was_measured_stands_on_the_page(script, paper):
     page = (RESULTS / f"{paper}.md").read_text(encoding="utf-8").splitlines()
     measured = [row for row in rows(paper) if row["verdict"] != script["UNMEASURED"]]
-    assert len(measured) > 10
+    assert len(measured) > PAPERS[paper]
     assert [line for row in measured if (line := line_of(script, row)) not in page] == []
 
 
