@@ -48,7 +48,10 @@ def draw(
         right.plot([max(asphericity[system] - 1, 1e-4)] * len(ratios), ratios, **style)
     low, top = left.get_xlim()
     left.plot([low, top], [low, top], label="unit line", **LINE)
-    left.set(xlabel=r"missing contacts $N_\mathrm{iso}-N_c$, less free modes", ylabel="quartic modes $N_q$")
+    left.set(
+        xlabel=r"missing contacts $N_\mathrm{iso}-N_c$, less free modes",
+        ylabel="quartic modes $N_q$",
+    )
     right.axhline(1, **LINE)
     right.set(xscale="log", yscale="log", ylabel="blocked motions over $N_q$")
     right.set_xlabel(ASPHERICITY)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import shlex
@@ -19,6 +20,7 @@ from jamshape.shapes.shape import Interaction
 
 ROOT = Path(__file__).resolve().parents[3]
 SKIN = 0.3
+_LONGEST = 80  # characters in the name of a file
 
 _CHECKED, _KEPT = "delay 0 every 1 check yes", "delay 2000000000 every 1 check no"
 MEASURES = {"force": _KEPT, "nve": _CHECKED, "step": _CHECKED, "memory": "delay 0 every 5 check no"}
@@ -96,6 +98,8 @@ def ours(sides: int, atoms: str, nve: str) -> Style:
 def state(work: Path, bench: Bench, particles: str, phi: float, n: int) -> Packing:
     """Return a compressed state, made once, by a process of its own."""
     tag = re.sub(r"[^\w.]+", "_", particles).strip("_")
+    if len(tag) > _LONGEST:
+        tag = f"{tag[:_LONGEST]}_{hashlib.sha256(tag.encode()).hexdigest()[:8]}"
     path = work / f"{tag}_{phi:g}_{n}.h5"
     if not (path.exists() and read_attributes(path).get("finished")):
         told = f"{particles} {bench.compress} --dimension {bench.dimension} --n {n} --phi-end {phi}"
