@@ -67,9 +67,15 @@ def test_parameters_make_particles_that_fit_and_come_back(case):
     assert SHAPES[guess_shape_style(diameters)].fits(diameters)
     shape.check_form(form, case.dimension)
     assert "$" in shape.label(parameters)
-    assert all(
-        math.isfinite(value) for value in shape.described(diameters, form, case.dimension).values()
-    )
+    told = shape.described(diameters, form, case.dimension)
+    assert all(map(math.isfinite, told.values()))
+    assert told["aspect_ratio"] >= 1
+    # It is round if and only if it fills the circle or sphere around it.
+    is_round = not shape.compiled(
+        (diameters[:1], form[:1]), case.dimension, Interaction()
+    ).rotation_length[0]
+    assert 0 < told["roundness"] < 1 + 1e-12
+    assert (told["roundness"] == close_to(1.0, 1e-12)) == is_round
 
 
 @pytest.mark.parametrize("name", SHAPES)

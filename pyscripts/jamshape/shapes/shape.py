@@ -360,13 +360,22 @@ class Shape(ABC):
     ) -> dict[str, float]:
         """Return descriptors of the first of (N, 3) diameters and (N, K) forms.
 
-        In the plane the asphericity, perimeter^2 / (4 pi area): 1 for discs (VanderWerf et al. 2018).
+        The aspect ratio of the box around it; the roundness, its area (volume) over that of the circle (sphere) around
+        it about its centre; and in the plane the asphericity, perimeter^2 / (4 pi area) (VanderWerf et al. 2018). All are
+        1 for discs and spheres.
         """
-        if dimension != 2:
-            return {}
-        area = float(self.compiled((diameters[:1], form[:1]), 2, Interaction()).measure[0])
-        length = self.perimeter(diameters[0], form[0])
-        return {"asphericity": length**2 / (4 * np.pi * area)}
+        body = self.compiled((diameters[:1], form[:1]), dimension, Interaction())
+        measure, reach = float(body.measure[0]), float(body.outer_radius[0])
+        box, around = (
+            diameters[0, :dimension],
+            np.pi * (reach**2 if dimension == 2 else 4 / 3 * reach**3),
+        )
+        found = {"aspect_ratio": float(box.max() / box.min()), "roundness": measure / around}
+        if dimension == 2:
+            found["asphericity"] = self.perimeter(diameters[0], form[0]) ** 2 / (
+                4 * np.pi * measure
+            )
+        return found
 
     @abstractmethod
     def perimeter(self, diameters: FloatArray, form: FloatArray) -> float:

@@ -92,10 +92,11 @@ class Superellipsoid(Shape):
         self, diameters: FloatArray, form: FloatArray, dimension: int
     ) -> dict[str, float]:
         """See `Shape.described`; in space asphericity and beta (Yuan et al. 2019, Eq. 2 and Sec. 2.1)."""
+        found = super().described(diameters, form, dimension)
         if dimension == 2:
-            return super().described(diameters, form, dimension)
+            return found
         axes = diameters[0] / 2
-        return {
+        return found | {
             "asphericity": float(asphericity(axes, form[0, 0])),
             "beta": float(reduced_aspect_ratio(axes)),
         }
