@@ -37,7 +37,7 @@ COMMANDS = {
     "export": "export packings to other programs, such as OVITO and MDAnalysis",
     "convert": "convert files of jamshape 0.1.0 to the present format",
     "initial": "make a random start without overlaps, for a deck or for Python",
-    "doctor": "tell what this installation can do, and what to install for the rest",
+    "doctor": "list what this installation can do, and what to install for the rest",
     "plugin": "locate the LAMMPS plugin, and show how a deck loads it",
 }
 """Subcommands, each a module of this package, with their descriptions."""

@@ -1,4 +1,4 @@
-"""Tell what this installation can do, and what to install for the rest.
+"""List what this installation can do, and what to install for the rest.
 
     jamshape doctor
 
@@ -49,7 +49,7 @@ class Found(NamedTuple):
     version: str | None
     """None if it is missing or does not work."""
     advice: str = ""
-    """What to do if it is missing."""
+    """Advice if it is missing."""
     is_needed: bool = False
 
 
