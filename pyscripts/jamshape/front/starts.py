@@ -16,7 +16,7 @@ from jamshape.front.reading import Held, packing_of
 from jamshape.packing import Packing as PackingLike
 from jamshape.protocols.random_start import random_packing, start_below
 from jamshape.shapes.particles import Particles
-from jamshape.shapes.shape import Interaction, Stiffness, stiffness_text
+from jamshape.shapes.shape import Interaction, Stiffness, law_text, stiffness_text
 
 
 def start_of(start: Held, sides: int = 2) -> Packing:
@@ -63,10 +63,12 @@ def told_of(start: Packing) -> dict[str, Any]:
 
 
 def digest(start: PackingLike) -> str:
-    """Name a packing without a file by its poses, and k_e other than 1, to distinguish it from another one."""
+    """Name a packing without a file by its poses, and k_e other than 1 and laws other than harmonic, to distinguish it from another one."""
     poses = b"".join(np.ascontiguousarray(x, np.float64).tobytes() for x in start.poses())
     if start.law.k_e != Interaction().k_e:
         poses += stiffness_text(start.law.k_e).encode()
+    if start.law.power != Interaction().power:
+        poses += law_text(start.law.power).encode()
     return f"packing {hashlib.blake2b(poses, digest_size=8).hexdigest()}"
 
 

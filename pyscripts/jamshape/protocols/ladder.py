@@ -219,7 +219,7 @@ class LadderDriver:
     def results(self) -> dict[str, Any]:
         """Return the law, and counts so far."""
         counts = {"ladder_done": self._n_done, "evaluations": self._evaluations}
-        return self._first.law._asdict() | counts
+        return self._first.law.stated() | counts
 
     def close(self) -> None:
         """Nothing is held outside of Python."""
