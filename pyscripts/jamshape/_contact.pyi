@@ -38,7 +38,13 @@ class _Shape:
     director: _Ints
     @overload
     def __init__(
-        self, diameters: _Reals, form: _Reals, dimension: int, k_e: float, sides: int, power: float = 2.0
+        self,
+        diameters: _Reals,
+        form: _Reals,
+        dimension: int,
+        k_e: float,
+        sides: int,
+        power: float = 2.0,
     ) -> None: ...
     @overload
     def __init__(
@@ -53,7 +59,13 @@ class _Shape:
     ) -> None: ...
     @overload
     def __init__(
-        self, diameters: _Reals, exponent: _Reals, dimension: int, k_e: float, sides: int, power: float = 2.0
+        self,
+        diameters: _Reals,
+        exponent: _Reals,
+        dimension: int,
+        k_e: float,
+        sides: int,
+        power: float = 2.0,
     ) -> None: ...
     @overload
     def __init__(

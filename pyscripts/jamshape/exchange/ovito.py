@@ -155,7 +155,9 @@ def from_ovito(data: Any) -> Packing:
         for name in ("position", "orientation", "edges", "tilt"):
             if f"{name}_rest" in fields:
                 fields[f"{name}_rest"] = as_rest(fields[f"{name}_rest"], fields[name])
-        law = {name: known[_PREFIX + name] for name in Interaction._fields if _PREFIX + name in known}
+        law = {
+            name: known[_PREFIX + name] for name in Interaction._fields if _PREFIX + name in known
+        }
         if isinstance(law["k_e"], str):  # a table
             law["k_e"] = stiffness_told(law["k_e"])
         fields["law"] = Interaction.told(law)

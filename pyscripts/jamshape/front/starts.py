@@ -49,7 +49,7 @@ def require_known_kinks(sides: int, dimension: int) -> None:
 def told_of(start: Packing) -> dict[str, Any]:
     """Return metadata on the particles of a start and on its source."""
     own = [parameter.name for parameter in start.shape.parameters]
-    names, results = (*own, "size_ratio", "kinds", "seed"), start.results
+    names, results = (*own, "size_ratio", "kinds", "law", "seed"), start.results
     found = {name: results[name] for name in names if name in results}
     # As UTF-8, whatever the locale: names may hold bytes that it cannot decode.
     name = os.fsencode(named(start.file)).decode(errors="replace") if start.file else digest(start)

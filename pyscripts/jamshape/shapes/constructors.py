@@ -68,7 +68,9 @@ def constructor(shape: Shape) -> Callable[..., Particles]:
         given.apply_defaults()
         numbers = dict(given.arguments)
         law = numbers.pop("law")
-        return _particles(shape, numbers, numbers.pop("size_ratio"), numbers.pop("kinds")).under(law)
+        return _particles(shape, numbers, numbers.pop("size_ratio"), numbers.pop("kinds")).under(
+            law
+        )
 
     make.__signature__ = signature  # type: ignore[attr-defined]
     make.__name__ = make.__qualname__ = shape.compiled_name

@@ -193,7 +193,9 @@ class Particles:
             parameters = {name: told[name] for name in own if name in told}
             return cls.of(shape, told.get("size_ratio"), **parameters).under(law)
         kinds = [text for text in str(told["kinds"]).split("; ") if "=" in text]
-        return cls.mixture(shape, [parse_kind(text) for text in kinds]).under(law) if kinds else None
+        return (
+            cls.mixture(shape, [parse_kind(text) for text in kinds]).under(law) if kinds else None
+        )
 
     def sample(self, n: int, rng: np.random.Generator) -> Sizes:
         """Draw n particles.

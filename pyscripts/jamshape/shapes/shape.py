@@ -7,6 +7,8 @@ of a particle, and draws it.
 from __future__ import annotations
 
 import importlib
+import math
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias
@@ -15,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jamshape.arrays import real_numbers
-from jamshape.checks import Range, require_in, said
+from jamshape.checks import RANGES, Range, require_in, said
 
 if TYPE_CHECKING:
     from jamshape.arrays import FloatArray, IntArray
@@ -182,7 +184,9 @@ def power_of(law: str | float) -> float:
     except (TypeError, ValueError):
         power = float("nan")
     if not HARMONIC <= power < float("inf"):
-        msg = f"law is {said(law)}, expected harmonic, hertz or a power of the overlap of at least 2"
+        msg = (
+            f"law is {said(law)}, expected harmonic, hertz or a power of the overlap of at least 2"
+        )
         raise ValueError(msg)
     return power
 
@@ -261,6 +265,42 @@ class Interaction(NamedTuple):
         stiffness = self.k_e if k_e is None else stiffness_of(k_e)
         of_bond = self.power if power is None else power_of(power)
         return Interaction(stiffness, self.sides if sides is None else sides, of_bond)
+
+    def root(self, energy: float) -> float:
+        """Return the root of an energy that is linear in the overlaps, and so in phi - phi_J."""
+        root: float = energy ** (1 / self.power)
+        return math.sqrt(energy) if self.power == HARMONIC else root
+
+    def over_harmonic(self, energy: float) -> float:
+        """Return the energy of a contact over that of a harmonic one of the same overlap, which is given in units of k_e.
+
+        Examples
+        --------
+        An overlap of 0.01, with the energies x^2 and (2 / 2.5) x^2.5 of two contacts:
+
+        >>> round(1e-4 * Interaction(power=2.5).over_harmonic(1e-4) / 1e-5, 12)
+        0.8
+        """
+        ratio: float = energy ** (self.power / 2 - 1)
+        return 2 / self.power * ratio
+
+    def overlap_of(self, energy: float) -> float:
+        """Return the overlap of contacts of which two have this energy, in units of k_e."""
+        return math.sqrt((self.power / 2 * energy) ** (2 / self.power))
+
+    def range_of(self, name: str) -> Range:
+        """Return the allowed targets ``u0`` or ``pressure``: those of harmonic contacts, of the same overlaps."""
+        ends = (RANGES[name].low, RANGES[name].high)
+        if name == "pressure":
+            low, high = (end ** (self.power - 1) for end in ends)
+        else:
+            low, high = (end * self.over_harmonic(end) for end in ends)
+        return RANGES[name]._replace(low=low, high=high)
+
+    def overlap_over_harmonic(self, slope: float) -> float:
+        """Return the overlap of a contact over that of a harmonic one of the same slope of the energy, in units of k_e."""
+        ratio: float = max(slope, sys.float_info.min) ** (1 / (self.power - 1) - 1)
+        return ratio
 
     def stated(self) -> dict[str, Any]:
         """Return the constants by name, as files state them: the power only where it is not that of harmonic contacts."""
