@@ -153,10 +153,11 @@ class LammpsDriver:
         return self._kept
 
     def results(self) -> dict[str, Any]:
-        """Return what LAMMPS left out, its version, and times of a box that yields."""
+        """Return what LAMMPS left out, its version, the power of a law that is not harmonic, and times of a box that yields."""
         session = self._session
         own = {"left_out": session.left_out(), "lammps_version": session.version}
-        return own | self._run.times()
+        law = {k: v for k, v in self._first.law.stated().items() if k == "power"}
+        return own | law | self._run.times()
 
     def close(self) -> None:
         """End LAMMPS."""

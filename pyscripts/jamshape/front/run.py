@@ -208,7 +208,7 @@ class RunFile(Recorded):
             `jamshape.measures.onset.fit_onset`.
         """
         try:
-            return fit_onset(self.phi, self.pressure)
+            return fit_onset(self.phi, self.pressure, power=Interaction.told(self.about).power)
         except ValueError:  # it ends below jamming
             return None
 

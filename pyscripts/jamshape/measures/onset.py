@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jamshape.arrays import FloatArray
+from jamshape.shapes.shape import HARMONIC
 
 # Pressures up to this fraction of the largest count as zero.
 _FLOOR = 1e-4
@@ -53,7 +54,9 @@ class OnsetFit(NamedTuple):
     last: int
 
 
-def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) -> OnsetFit:
+def fit_onset(
+    phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None, power: float = HARMONIC
+) -> OnsetFit:
     """Fit a line to the pressure just above the onset of jamming and extrapolate it to zero.
 
     Marschall & Teitel 2018, Fig. 4, find by eye "the part of the p vs phi curve where the pressure
@@ -79,6 +82,9 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
     p_error : (T,) array_like, optional
         Standard errors, such as those of a mean over samples. Only their ratios matter, as weights;
         the scatter about the line gives the error of the fit.
+    power : float
+        That of the overlap in the energy of a contact, A: p^(1 / (A - 1)) is fitted instead of p, which is linear in phi
+        for harmonic contacts only.
 
     Returns
     -------
@@ -94,6 +100,7 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
         If the data have no onset, no linear part above it, or an argument is out of its range.
     """
     x, y, weight = _checked(phi, p, p_error)
+    y = np.copysign(np.abs(y) ** (1 / (power - 1)), y)
     scale = float(np.abs(y).max()) or 1.0
     y = y / scale
     parts, min_rise = _lasting_rises(y)
