@@ -30,7 +30,7 @@ class Series(NamedTuple):
     def file(self) -> str:
         """Name of the file of its results."""
         span = f"x{self.overlaps[0]:.3g}_{self.overlaps[-1]:.3g}_{len(self.overlaps)}"
-        return f"discs_{self.law}_n{self.n}_{span}_s{self.seed}.json"
+        return f"discs_{self.law.replace(' ', '-')}_n{self.n}_{span}_s{self.seed}.json"
 
 
 def compressed(*series: Any) -> list[dict[str, Any]]:

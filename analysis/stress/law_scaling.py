@@ -98,9 +98,10 @@ def scaling_of(law: str, n: int, table: Table, spans: Mapping[str, tuple[float, 
     chosen = list(draws(len(x)))[::5]
     powers = {}
     for name, y in columns.items():
-        drawn = [slope(mean_of(x[k]), mean_of(y[k]), spans[name]) for k in chosen]
+        drawn = np.array([slope(mean_of(x[k]), mean_of(y[k]), spans[name]) for k in chosen])
+        known = drawn[np.isfinite(drawn)]
         value = slope(mean_of(x), mean_of(y), spans[name])
-        powers[name] = Power(value, float(np.nanstd(drawn)))
+        powers[name] = Power(value, float(known.std()) if len(known) else float("nan"))
     found = {name: mean_and_error(y) for name, y in columns.items()}
     means, errors = ({name: found[name][k] for name in found} for k in (0, 1))
     return Scaling(law, n, len(x), mean_of(x), means, errors, powers)

@@ -77,7 +77,9 @@ def test_second_derivatives_are_differences_of_forces(case, power):
         expected_along = along @ expected
         assert along @ (hessian @ along) == pytest.approx(expected_along, rel=1e-6)
         return
-    np.testing.assert_allclose(hessian @ along, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+    np.testing.assert_allclose(
+        hessian @ along, expected, rtol=0, atol=1e-6 * np.abs(expected).max()
+    )
 
 
 @pytest.mark.lammps
@@ -144,5 +146,7 @@ def test_harmonic_contacts_are_the_default_and_say_nothing():
 
 @pytest.mark.parametrize("law", [1.9, math.nan, math.inf, "hooke", "", None, "power 1", [2.5]])
 def test_other_laws_are_refused(law):
-    with pytest.raises((TypeError, ValueError), match=r"law is .*, expected harmonic, hertz or a power"):
+    with pytest.raises(
+        (TypeError, ValueError), match=r"law is .*, expected harmonic, hertz or a power"
+    ):
         Particles.of(TYPICAL[0].shape).under(law)
