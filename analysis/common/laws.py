@@ -10,6 +10,7 @@ import numpy as np
 import jamshape as js
 from jamshape.checks import NotReachedWarning
 from jamshape.landscape import Landscape, State
+from jamshape.shapes.particles import Particles
 from jamshape.vibration.elasticity import moduli
 from jamshape.vibration.hessian import DynamicalMatrix, dynamical_matrix
 
@@ -36,7 +37,7 @@ class Series(NamedTuple):
 def compressed(*series: Any) -> list[dict[str, Any]]:
     """Make the packing of a `Series` at its lowest energy, raise the energy, and measure at each."""
     of, rows = Series(*series), []
-    discs = js.Spherocylinders(alpha=0, law=of.law)
+    discs = Particles.of(alpha=0.0).under(of.law)
     packing: js.Packing | None = None
     phi_J = np.nan
     with warnings.catch_warnings():

@@ -122,7 +122,8 @@ def figure_from(found: list[Scaling]) -> Figure:
                 at = np.flatnonzero(own)[-1]
                 line = y[at] * (of.distance / of.distance[at]) ** expected(of.law)[name]
                 axes.plot(of.distance, line, "-", lw=0.8, color=style["color"])
-        axes.set(xscale="log", yscale="log", xlabel=r"$\phi-\phi_J$", ylabel=label)
+        axes.set(xscale="log", xlabel=r"$\phi-\phi_J$", ylabel=label)
+        axes.set_yscale("log" if axes.dataLim.y1 > 0 else "linear")  # few packings have no excess
         axes.legend(fontsize=7)
     places[-1].axis("off")
     laws = ", ".join(dict.fromkeys(of.law for of in found))

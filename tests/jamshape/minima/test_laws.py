@@ -88,9 +88,10 @@ def test_moduli_are_those_of_strained_packings(law):
     packing = made(law, 1e-3)
     bulk = js.modes(packing).moduli.bulk.relaxed
     step = 1e-5 * (packing.phi - packing.results["phi_J"])
-    pressures = []
-    for phi in (packing.phi - step, packing.phi + step):
-        pressures.append(js.minimise(packing, phi=phi, tolerance=1e-12, progress=False).pressure)
+    pressures = [
+        js.minimise(packing, phi=phi, tolerance=1e-12, progress=False).pressure
+        for phi in (packing.phi - step, packing.phi + step)
+    ]
     expected = packing.phi * (pressures[1] - pressures[0]) / (2 * step)
     assert bulk == pytest.approx(expected, rel=1e-5)
 
