@@ -85,10 +85,9 @@ def fit_onset(
     Returns
     -------
     OnsetFit
-        phi_J(kappa), at the rate of this compression: it rises as kappa falls, until kappa is about 1e-9.
-        `jamshape.measures.jamming` finds whether states there stay jammed. The error covers neither that nor differences
-        between samples, which are larger, nor stretches with fewer rows than a line needs: if sampling of p is so
-        sparse that it misses the first, phi_J is that of a later one.
+        phi_J(kappa), at the rate of this compression: it rises as kappa falls, until kappa is about 1e-9. The error covers
+        neither whether states there stay jammed (`jamshape.measures.jamming`) nor differences between samples, which are
+        larger, nor rows so sparse that a line misses the first stretch.
 
     Raises
     ------
