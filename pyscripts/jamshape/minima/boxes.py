@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jamshape.arrays import FloatArray, LongArray
-from jamshape.checks import ArgumentError, require_positive, require_stated
+from jamshape.checks import ArgumentError, require_in, require_positive, require_stated
 from jamshape.contacts import CrossingError
 from jamshape.landscape import Landscape
 from jamshape.landscape.local_energy_model import LocalEnergyModel
@@ -182,6 +182,9 @@ class Yielding:
 
     def require(self, landscape: Landscape) -> None:
         """Refuse a box that the target cannot have, or a target out of reach; raises ValueError."""
+        for name in ("u0", "pressure"):
+            if (value := getattr(self, name)) is not None:
+                require_in(name, value, landscape.law.range_of(name))
         if self.u0 is not None:
             require_reachable(landscape, Target(self.u0))
         strains = strains_of(self.box, landscape.particles.dimension)
