@@ -116,7 +116,7 @@ def figure_from(found: list[Scaling]) -> Figure:
             style, y = marked(k), of.means[name]
             own = y > 0
             power = of.powers[name]
-            text = f"{of.law}, $N={of.n}$: {power.value:.2f}$\\pm${power.error:.2f}"
+            text = f"{of.law}, $N={of.n}$: {power.value:.3f}$\\pm${power.error:.3f}"
             axes.errorbar(of.distance[own], y[own], of.errors[name][own], **style, label=text)
             if own.any():
                 at = np.flatnonzero(own)[-1]

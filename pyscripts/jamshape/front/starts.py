@@ -130,7 +130,7 @@ class Start(NamedTuple):
             return told_of(self.known)
         assert self.particles
         own = {"n": self.n, self.phi_name: self.phi, "seed": self.seed}
-        return dict(self.particles.told) | own
+        return self.particles.identity | own
 
     def random(self, phi: float | None = None) -> PackingLike:
         """Make the random start at a packing fraction; by default the one asked for, or the densest possible."""

@@ -361,6 +361,7 @@ class Pipeline:
     def _told(self) -> dict[str, Any]:
         """Return all but measurements."""
         told = self._recipe.attributes() | self._of_compression() | self._making.attributes
+        told = {name: value for name, value in told.items() if value is not None}
         told |= {"wall_seconds": time.perf_counter() - self._began}
         return told | {"evaluations": self._making.landscape.evaluations}
 

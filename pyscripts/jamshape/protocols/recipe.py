@@ -370,7 +370,7 @@ class Recipe:
     def before_target(self) -> dict[str, Any]:
         """Return the attributes that identify the stages before the energy search."""
         numbers = {"n": self.n, "seed": self.seed, "phi_start": self.phi_start}
-        return dict(self.particles.told) | numbers | self.way.attributes(self.target)
+        return self.particles.identity | numbers | self.way.attributes(self.target)
 
     def require_particles(self, path: Path) -> None:
         """Refuse a file that is damaged or holds other particles than these.

@@ -98,6 +98,11 @@ class Particles:
         known = [f"{k}={v if isinstance(v, str) else format(v, 'g')}" for k, v in self.told.items()]
         return f"Particles({', '.join([repr(self.shape.name), *known])})"
 
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Return `told` with all that identifies the particles in a file: None for a law that is not to be there."""
+        return {"law": None} | dict(self.told)
+
     def under(self, law: str | float) -> Particles:
         """Return the same particles with another law of their contacts.
 

@@ -138,3 +138,20 @@ def test_explicit_and_implicit_steps_agree(law):
     ]
     assert pressures[1] == pytest.approx(pressures[0], rel=1e-4)
     assert np.isfinite(pressures).all()
+
+
+def test_a_file_of_another_law_is_refused(tmp_path):
+    """Either way, of packings, of compressions in LAMMPS and of implicit ones."""
+    hertz, harmonic = (js.Spherocylinders(alpha=0, law=law) for law in ("hertz", "harmonic"))
+    calls = [
+        lambda of, file: js.make_packing(of, n=8, u0=1e-8, protocol="marschall-2018", kappa=1e-2, file=file, progress=False),
+        lambda of, file: js.compress(of, n=8, kappa=1e-2, file=file, progress=False),
+        lambda of, file: js.slow_compress(of, n=8, kappa=1e-2, file=file, progress=False),
+    ]  # fmt: skip
+    for k, call in enumerate(calls):
+        for one, other in ((hertz, harmonic), (harmonic, hertz)):
+            file = tmp_path / f"{k}_{one.power}.h5"
+            call(one, file)
+            call(one, file)
+            with pytest.raises(ValueError, match="law"):
+                call(other, file)
