@@ -78,8 +78,7 @@ template <class Model> class ShapeOf {
   /// k_e (T, T) by species (N,), numbered from 1.
   template <class Numbers>
   ShapeOf(const Array2<double> &diameters, const Numbers &form, int dimension,
-          const Array2<double> &k_e, const Array1<std::int64_t> &species,
-          const LawSettings &with) :
+          const Array2<double> &k_e, const Array1<std::int64_t> &species, const LawSettings &with) :
       ShapeOf(diameters, rows_of(form), dimension, laws_of<Model>(k_e, species, with))
   {
     require(species.size() == n(), "species does not have the shape (N,).");

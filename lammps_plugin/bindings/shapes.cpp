@@ -213,9 +213,8 @@ template <class Model> void export_shape(nb::module_ &m)
     of.def(
         "__init__",
         [](Self *self, const Array2<double> &diameters, const Numbers &its, int dimension,
-           double k_e, int sides, double power) {
-          new (self) Self(diameters, its, dimension, k_e, {sides, power});
-        },
+           double k_e, int sides,
+           double power) { new (self) Self(diameters, its, dimension, k_e, {sides, power}); },
         "diameters"_a, nb::arg(name), "dimension"_a, "k_e"_a, "sides"_a, "power"_a = HARMONIC,
         text);
     of.def(
@@ -227,7 +226,7 @@ template <class Model> void export_shape(nb::module_ &m)
         },
         "diameters"_a, nb::arg(name), "dimension"_a, "k_e"_a, "species"_a, "sides"_a,
         "power"_a = HARMONIC,
-           "The same with a symmetric k_e (T, T) by species (N,), numbered from 1.");
+        "The same with a symmetric k_e (T, T) by species (N,), numbered from 1.");
   };
   def_made_of(
       std::common_type<Array2<double>>(), "form",

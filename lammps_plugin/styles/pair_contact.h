@@ -136,10 +136,7 @@ class PairContact : public LAMMPS_NS::Pair {
 
   /// Names of the style, of its energy and of the objects without a contact force, in messages.
   virtual std::string style_name() const = 0;
-  virtual std::string settings_rule() const 
-  {
-    return "'law LAW' or no arguments: leave them out";
-  }
+  virtual std::string settings_rule() const { return "'law LAW' or no arguments: leave them out"; }
   virtual std::string energy_name() const { return "k_e"; }
   virtual std::string without_force() const { return "crossing spines or coinciding centres"; }
 

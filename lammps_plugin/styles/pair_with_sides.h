@@ -11,7 +11,8 @@
 
 namespace jamshape {
 
-/// Pair styles of shapes with straight sides: pair_style NAME sides one|two [law LAW]; pair_coeff I J k_e
+/// Pair styles of shapes with straight sides: pair_style NAME sides one|two [law LAW]; pair_coeff I
+/// J k_e
 template <class Model> class PairWithSides : public PairContactOf<Model> {
  public:
   using PairContactOf<Model>::PairContactOf;

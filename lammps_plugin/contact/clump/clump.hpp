@@ -119,8 +119,7 @@ Contact<D, S, MOST_BONDS_OF_CLUMPS> contact_of(const ClumpBody<D, S> &i, const C
   const Vec<D, S> r = i.centre - j.centre;
   const auto add = [&](int a, int b) {
     const Vec<D, S> arm_i = i.arm(a), arm_j = j.arm(b);
-    add_disc_bond(contact, {arm_i, arm_j, r + arm_i - arm_j, i.radius(a), j.radius(b)},
-                  law.bond);
+    add_disc_bond(contact, {arm_i, arm_j, r + arm_i - arm_j, i.radius(a), j.radius(b)}, law.bond);
     return contact.status != ContactStatus::CROSSING;
   };
   if constexpr (std::is_same_v<S, ValueOf<S>>) {

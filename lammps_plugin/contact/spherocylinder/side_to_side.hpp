@@ -116,8 +116,8 @@ S log_ratio_of(const SpinePair<D, S> &p, const Feet<D, S> &near, const Feet<D, S
 }
 
 /// The norm V = (E(a)^(1/w) + E(b)^(1/w))^w of two energies that grow as a power of the overlap,
-/// from ln(b / a): their fractions of the sum, shares in V = share_a E(a) + share_b E(b), and d ln V
-/// / dw, the entropy of the fractions.
+/// from ln(b / a): their fractions of the sum, shares in V = share_a E(a) + share_b E(b), and d ln
+/// V / dw, the entropy of the fractions.
 template <class S> struct EndNorm {
   S part_a, part_b, share_a, share_b, entropy;
 

@@ -57,8 +57,8 @@ template <int D, class S> struct TangencyLoad {
 /// eta. By the envelope theorem the torques are those of this force at the point of tangency of the
 /// **scaled** bodies. Normal and levers of the one bond are the gradient of x over |grad_r x|, that
 /// of a length; its reach is 1 / |grad_r x|, so that the stiffness is E'' / reach^2 as for
-/// other shapes; its distance is reach times x, so that 1 - distance / reach is the overlap. For two
-/// spheres of contact distance d the distance is r / 2, and the reach d / 2 where they touch.
+/// other shapes; its distance is reach times x, so that 1 - distance / reach is the overlap. For
+/// two spheres of contact distance d the distance is r / 2, and the reach d / 2 where they touch.
 ///
 /// Where two faces are in contact, the scale hardly depends on the point of tangency, and where two
 /// tips are, hardly on the normal: a small gap between the bounds of the scale does not bound the
@@ -70,8 +70,7 @@ template <int D, class S> class SuperellipsoidContact {
   using Body = SuperellipsoidBody<D, S>;
 
   SuperellipsoidContact(const Body &body_i, const Body &body_j, const SuperellipsoidLaw &of) :
-      i(body_i), j(body_j), r(body_i.centre - body_j.centre), law(of.bond),
-      shortcuts(of.shortcuts)
+      i(body_i), j(body_j), r(body_i.centre - body_j.centre), law(of.bond), shortcuts(of.shortcuts)
   {
   }
 
