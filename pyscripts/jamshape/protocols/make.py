@@ -151,7 +151,7 @@ def _plan(
         del first
         return Pipeline(recipe, source, checkpoint, retry=retry)
 
-    return Plan(MAKING, "a packing", recipe.attributes(), begin, restore, finish=finish)
+    return Plan(MAKING, "a packing", recipe.identity, begin, restore, finish=finish)
 
 
 def _making_file(out: Path) -> Path:
@@ -215,7 +215,7 @@ def _compression(recipe: Recipe) -> Plan:
             recipe.target.require(Landscape(packing))
         return packing
 
-    told, way = recipe.before_target(), recipe.way
+    told, way = {"law": None} | recipe.before_target(), recipe.way
     if isinstance(way, Dynamics):
         return approach.plan(start, way.approach, told)
     assert isinstance(way, Compressed)
@@ -361,7 +361,6 @@ class Pipeline:
     def _told(self) -> dict[str, Any]:
         """Return all but measurements."""
         told = self._recipe.attributes() | self._of_compression() | self._making.attributes
-        told = {name: value for name, value in told.items() if value is not None}
         told |= {"wall_seconds": time.perf_counter() - self._began}
         return told | {"evaluations": self._making.landscape.evaluations}
 
@@ -426,5 +425,5 @@ def require_same(out: Path, recipe: Recipe) -> None:
     ------
     ValueError
     """
-    require_attributes(out, recipe.attributes())
+    require_attributes(out, recipe.identity)
     recipe.require_particles(out)
