@@ -35,7 +35,7 @@ def rotation_rates(
     ValueError
         If the packing is not in two dimensions.
     """
-    landscape = Landscape(packing, *(law or packing.law))
+    landscape = Landscape(packing if law is None else packing.with_(law=law))
     velocity = -landscape.evaluate(State.of(packing)).gradient / drag_coefficients(landscape, k_d)
     _, turns = landscape.motion(velocity)
     angle = np.asarray(packing.orientation, np.float64)

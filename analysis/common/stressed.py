@@ -164,15 +164,20 @@ class Table(NamedTuple):
         return len(self.rows)
 
 
+def rows_of(folder: Path, tasks: Sequence[Task]) -> list[list[dict[str, Any]]]:
+    """Read the results of those of the tasks that are finished."""
+    paths = [folder / one.file for one in tasks]
+    rows = [json.loads(path.read_text()) for path in paths if path.exists()]
+    if not rows:
+        msg = f"{folder} has no results of {tasks[0].file} and others, expected some; leave out --only-kept"
+        raise ValueError(msg)
+    return rows
+
+
 def table_of(folder: Path, series: Iterable[Series]) -> Table:
     """Read the finished ones of series with the same pressures."""
     every = list(series)
-    paths = [folder / one.file for one in every]
-    rows = [json.loads(path.read_text()) for path in paths if path.exists()]
-    if not rows:
-        msg = f"{folder} has no results of {every[0].file} and others, expected some; leave out --only-kept"
-        raise ValueError(msg)
-    return Table(np.array(every[0].pressures), rows)
+    return Table(np.array(every[0].pressures), rows_of(folder, every))
 
 
 def write_table(options: Namespace, found: Any) -> None:

@@ -158,10 +158,10 @@ nb::dict contacts(const BodyPairs<Rows> &pairs, const typename Rows::Model::Law 
 }
 
 nb::dict spherocylinder_contacts(const Bodies &bodies_i, const Bodies &bodies_j, double k_e,
-                                 int sides)
+                                 int sides, double power)
 {
   return contacts(BodyPairs<SpherocylinderRows>(bodies_i, bodies_j),
-                  law_of<SpherocylinderModel>(k_e, sides));
+                  law_of<SpherocylinderModel>(k_e, {sides, power}));
 }
 
 nb::object spine_distances(const Bodies &bodies_i, const Bodies &bodies_j)
@@ -198,7 +198,7 @@ nb::dict superellipsoid_contacts(const Bodies &bodies_i, const Bodies &bodies_j,
                                  bool extended, bool errors)
 {
   const BodyPairs<SuperellipsoidRows> pairs(bodies_i, bodies_j);
-  const auto law = law_of<SuperellipsoidModel>(epsilon, 1);
+  const auto law = law_of<SuperellipsoidModel>(epsilon, {1});
   return in_dimension(pairs.dimension(), [&](auto D) {
     return superellipsoid_contacts_in<D>(pairs, law, extended, errors);
   });
@@ -210,7 +210,7 @@ FoundTangency<D, double> tangency_in_long(const BodyPairs<SuperellipsoidRows> &p
 {
   using Long = long double;
   const auto pair = SuperellipsoidRows::in_long<D>(pairs.row_i(n), pairs.row_j(n),
-                                                   law_of<SuperellipsoidModel>(1.0, 1));
+                                                   law_of<SuperellipsoidModel>(1.0, {1}));
   const PosedBodies<SuperellipsoidModel, D, Long> bodies(pair);
   const auto longer =
       tangency_of(bodies.i, bodies.j, TangencyWish<D, Long>{pair.r, false, nullptr});
@@ -377,7 +377,7 @@ void export_probes(nb::module_ &m)
 {
   using namespace nb::literals;
   m.def("spherocylinder_contacts", &spherocylinder_contacts, "bodies_i"_a, "bodies_j"_a, "k_e"_a,
-        "sides"_a,
+        "sides"_a, "power"_a = HARMONIC,
         "Contacts of M pairs. Bodies are (M, 6) in 2D, (M, 8) in 3D: centre, unit axis,\n"
         "half_length, radius. Returns the arrays of Spherocylinders.contacts, of all M pairs\n"
         "(status 0: apart).");

@@ -17,19 +17,28 @@
 
 namespace jamshape {
 
+/// Settings of the law of all contacts, from their Python arguments.
+struct LawSettings {
+  int sides;
+  double power = HARMONIC;
+};
+
 /// The law of contacts from its Python arguments.
-template <class Model> typename Model::Law law_of(double k_e, int sides)
+template <class Model> typename Model::Law law_of(double k_e, const LawSettings &with)
 {
   require(k_e > 0.0 && std::isfinite(k_e),
           "k_e is " + shown(k_e) + ", expected a positive energy.");
-  require(sides == 1 || sides == 2, "sides is " + std::to_string(sides) + ", expected 1 or 2.");
-  return Model::law(k_e, static_cast<Sides>(sides));
+  require(with.sides == 1 || with.sides == 2,
+          "sides is " + std::to_string(with.sides) + ", expected 1 or 2.");
+  require(with.power >= HARMONIC && std::isfinite(with.power),
+          "power is " + shown(with.power) + ", expected a number from 2 on.");
+  return Model::law({k_e, with.power}, static_cast<Sides>(with.sides));
 }
 
 /// The laws of contacts for k_e (T, T) and species (N,), numbered from 1.
 template <class Model>
 Laws<typename Model::Law> laws_of(const Array2<double> &k_e, const Array1<std::int64_t> &species,
-                                  int sides)
+                                  const LawSettings &with)
 {
   const std::size_t n = k_e.shape(0);
   require(n > 0 && k_e.shape(1) == n, "k_e does not have the shape (T, T).");
@@ -37,7 +46,7 @@ Laws<typename Model::Law> laws_of(const Array2<double> &k_e, const Array1<std::i
   for (std::size_t at = 0; at < n * n; ++at) {
     require(k_e.data()[at] == k_e.data()[at % n * n + at / n],
             "k_e is not symmetric, expected the same number for I J as for J I.");
-    table.push_back(law_of<Model>(k_e.data()[at], sides));
+    table.push_back(law_of<Model>(k_e.data()[at], with));
   }
   std::vector<std::size_t> kinds;
   for (std::size_t i = 0; i < species.size(); ++i) {
@@ -61,16 +70,16 @@ template <class Model> class ShapeOf {
   /// `form` is an Array2 (N, K) or, of exponents, an Array1 (N,), which shapes without ignore.
   template <class Numbers>
   ShapeOf(const Array2<double> &diameters, const Numbers &form, int dimension, double k_e,
-          int sides) :
-      ShapeOf(diameters, rows_of(form), dimension, Laws<Law>(law_of<Model>(k_e, sides)))
+          const LawSettings &with) :
+      ShapeOf(diameters, rows_of(form), dimension, Laws<Law>(law_of<Model>(k_e, with)))
   {
   }
 
   /// k_e (T, T) by species (N,), numbered from 1.
   template <class Numbers>
   ShapeOf(const Array2<double> &diameters, const Numbers &form, int dimension,
-          const Array2<double> &k_e, const Array1<std::int64_t> &species, int sides) :
-      ShapeOf(diameters, rows_of(form), dimension, laws_of<Model>(k_e, species, sides))
+          const Array2<double> &k_e, const Array1<std::int64_t> &species, const LawSettings &with) :
+      ShapeOf(diameters, rows_of(form), dimension, laws_of<Model>(k_e, species, with))
   {
     require(species.size() == n(), "species does not have the shape (N,).");
   }

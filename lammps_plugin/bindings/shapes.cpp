@@ -210,17 +210,29 @@ template <class Model> void export_shape(nb::module_ &m)
   nb::class_<Self> of(m, class_name<Model>().c_str(), Model::SHAPE_RULE);
   const auto def_made_of = [&](auto numbers, const char *name, const char *text) {
     using Numbers = typename decltype(numbers)::type;
-    of.def(nb::init<const Array2<double> &, const Numbers &, int, double, int>(), "diameters"_a,
-           nb::arg(name), "dimension"_a, "k_e"_a, "sides"_a, text);
-    of.def(nb::init<const Array2<double> &, const Numbers &, int, const Array2<double> &,
-                    const Array1<std::int64_t> &, int>(),
-           "diameters"_a, nb::arg(name), "dimension"_a, "k_e"_a, "species"_a, "sides"_a,
-           "The same with a symmetric k_e (T, T) by species (N,), numbered from 1.");
+    of.def(
+        "__init__",
+        [](Self *self, const Array2<double> &diameters, const Numbers &its, int dimension,
+           double k_e, int sides,
+           double power) { new (self) Self(diameters, its, dimension, k_e, {sides, power}); },
+        "diameters"_a, nb::arg(name), "dimension"_a, "k_e"_a, "sides"_a, "power"_a = HARMONIC,
+        text);
+    of.def(
+        "__init__",
+        [](Self *self, const Array2<double> &diameters, const Numbers &its, int dimension,
+           const Array2<double> &k_e, const Array1<std::int64_t> &species, int sides,
+           double power) {
+          new (self) Self(diameters, its, dimension, k_e, species, {sides, power});
+        },
+        "diameters"_a, nb::arg(name), "dimension"_a, "k_e"_a, "species"_a, "sides"_a,
+        "power"_a = HARMONIC,
+        "The same with a symmetric k_e (T, T) by species (N,), numbered from 1.");
   };
   def_made_of(
       std::common_type<Array2<double>>(), "form",
       "Particles of diameters (N, 3) and further numbers (N, K), such as exponents; sides is\n"
-      "1 or 2, the bonds of a side-to-side contact, for shapes whose law supports both.");
+      "1 or 2, the bonds of a side-to-side contact, for shapes whose law supports both; power is\n"
+      "that of the overlap in the energy of a bond, at least 2.");
   def_made_of(std::common_type<Array1<double>>(), "exponent",
               "The same with exponents (N,), ignored by shapes without them.");
   of.attr("name") = Model::NAME;

@@ -2,6 +2,7 @@
 
 #include "contact/contact.hpp"
 #include "contact/math/vec.hpp"
+#include "contact/power_law.hpp"
 
 #include <algorithm>
 #include <limits>
@@ -41,10 +42,11 @@ ErrorsOfGeometry<T> errors_of_geometry(const Body &, const Body &,
 /// bodies are those of the contact in full precision T.
 template <int D, class Body, class S, class T, int BONDS>
 ContactErrors errors_of(const Body &i, const Body &j, const Contact<D, S, BONDS> &contact,
-                        const Contact<D, T, BONDS> &wide)
+                        const Contact<D, T, BONDS> &wide, const PowerLaw &law)
 {
   const ErrorsOfGeometry<T> by = errors_of_geometry(i, j, wide);
-  const T force = norm(wide.force), of_force = by.overlap + by.normal + by.overlap * by.normal;
+  const T of_slope = law.change_of_gradient(by.overlap);
+  const T force = norm(wide.force), of_force = of_slope + by.normal + of_slope * by.normal;
   T arm = 0;
   for (int b = 0; b < wide.n_bonds; ++b) {
     const Vec<D, T> arm_j = wide.bond[b].arm_i + (i.centre - j.centre);
@@ -54,7 +56,7 @@ ContactErrors errors_of(const Body &i, const Body &j, const Contact<D, S, BONDS>
   const Torques off_i = constants_of<T>(contact.torque_i) - wide.torque_i;
   const Torques off_j = constants_of<T>(contact.torque_j) - wide.torque_j;
   return {static_cast<double>(abs(T(contact.energy) - wide.energy) +
-                              wide.energy * by.overlap * (2 + by.overlap)),
+                              wide.energy * law.change_of_energy(by.overlap)),
           static_cast<double>(norm(constants_of<T>(contact.force) - wide.force) + force * of_force),
           static_cast<double>(std::max(norm(off_i), norm(off_j)) +
                               force * (arm * of_force + by.point * (1 + of_force)))};

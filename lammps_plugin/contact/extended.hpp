@@ -128,7 +128,7 @@ ContactErrors errors_at(const ContactOf<Model, D> &contact,
   const ContactOf<Model, D, long double> wide = contact_of(bodies.i, bodies.j, pair.law);
   if (contact.status != ContactStatus::TOUCHING || wide.status != ContactStatus::TOUCHING)
     return {NAN, NAN, NAN};
-  return errors_of(bodies.i, bodies.j, contact, wide);
+  return errors_of(bodies.i, bodies.j, contact, wide, pair.law.bond);
 }
 
 }  // namespace jamshape

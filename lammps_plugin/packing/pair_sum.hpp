@@ -437,7 +437,7 @@ template <class Pairs> class NumberedBlock {
       }
       number[block.n] = p;
       block.put(static_cast<int>(pairs.first(p)), static_cast<int>(pairs.second(p)), r,
-                Model::k_e(pairs.law(p)));
+                pairs.law(p).bond.k_e);
       block.n += pairs.may_touch(p, r);  // a branch would be unpredictable
     }
     return p;

@@ -8,7 +8,7 @@ namespace jamshape {
 
 namespace {
 
-/// pair_style clump/harmonic; pair_coeff I J k_e [discs]
+/// pair_style clump/harmonic [law LAW]; pair_coeff I J k_e [discs]
 class PairClumpHarmonic : public PairContactOf<ClumpModel> {
  public:
   using PairContactOf::PairContactOf;

@@ -42,6 +42,13 @@ constexpr double MOST_TILT = 1e-8;
 /// Length of numbers of a type in a data file, of whose lines LAMMPS reads 255 characters.
 constexpr std::size_t LONGEST_COEFFICIENTS = 200;
 
+/// Powers of contact laws with names.
+const std::map<std::string, double> NAMED_POWERS{{"harmonic", HARMONIC}, {"hertz", 2.5}};
+
+/// In restart files, what precedes the power of a law that is not harmonic, where files of harmonic
+/// ones have a number that is not negative.
+constexpr int LAW_FOLLOWS = -1;
+
 bool begins_with(const char *text, const char *beginning)
 {
   return std::strncmp(text, beginning, std::strlen(beginning)) == 0;
@@ -122,9 +129,48 @@ void PairContact::allocate()
 
 void PairContact::settings(int narg, char **arg)
 {
-  if (narg == 0 || begins_shortcuts(arg[0])) return read_disabled_shortcuts(narg, arg);
+  if (narg == 0 || begins_settings(arg[0])) return read_settings(narg, arg);
   error->all(FLERR, "pair_style " + style_name() + " found '" + joined(narg, arg) + "', expected " +
                         settings_rule() + ".");
+}
+
+bool PairContact::begins_settings(const std::string &word)
+{
+  return word == "law" || begins_shortcuts(word);
+}
+
+void PairContact::read_settings(int narg, char **arg)
+{
+  power = HARMONIC;
+  const int n_read = narg > 0 && std::string(arg[0]) == "law" ? read_law(narg, arg) : 0;
+  read_disabled_shortcuts(narg - n_read, arg + n_read);
+}
+
+/// Reads 'law harmonic', 'law hertz' or 'law power A'; returns the number of words.
+int PairContact::read_law(int narg, char **arg)
+{
+  const std::string name = narg > 1 ? arg[1] : "";
+  const auto named = NAMED_POWERS.find(name);
+  if (named != NAMED_POWERS.end()) {
+    power = named->second;
+    return 2;
+  }
+  if (name == "power" && narg > 2) {
+    power = LAMMPS_NS::utils::numeric(FLERR, arg[2], false, lmp);
+    if (power >= HARMONIC && std::isfinite(power)) return 3;
+  }
+  error->all(FLERR, "pair_style " + style_name() + " found '" + joined(narg, arg) +
+                        "', expected 'law harmonic', 'law hertz' or 'law power A' with A >= 2: "
+                        "below 2 contacts would be infinitely stiff where they open.");
+}
+
+std::string PairContact::settings_text() const
+{
+  if (power == HARMONIC) return "";
+  for (const auto &[name, of_name] : NAMED_POWERS) {
+    if (power == of_name) return " law " + name;
+  }
+  return " law power " + exactly(power);
 }
 
 void PairContact::coeff(int narg, char **arg)
@@ -670,8 +716,32 @@ std::string PairContact::more_coefficients(int type, std::size_t longest) const
   return text.size() < longest ? text : "";
 }
 
+void PairContact::write_restart_settings(FILE *fp)
+{
+  if (power == HARMONIC) return;
+  fwrite(&LAW_FOLLOWS, sizeof(int), 1, fp);
+  fwrite(&power, sizeof(double), 1, fp);
+}
+
+void PairContact::read_restart_settings(FILE *fp)
+{
+  power = HARMONIC;
+  if (comm->me == 0) {
+    int next = 0;
+    const long here = std::ftell(fp);
+    LAMMPS_NS::utils::sfread(FLERR, &next, sizeof(int), 1, fp, nullptr, error);
+    if (next == LAW_FOLLOWS) {
+      LAMMPS_NS::utils::sfread(FLERR, &power, sizeof(double), 1, fp, nullptr, error);
+    } else {
+      std::fseek(fp, here, SEEK_SET);
+    }
+  }
+  MPI_Bcast(&power, 1, MPI_DOUBLE, 0, world);
+}
+
 void PairContact::write_restart(FILE *fp)
 {
+  write_restart_settings(fp);
   for (int i = 1; i <= atom->ntypes; ++i) {
     for (int j = i; j <= atom->ntypes; ++j) {
       fwrite(&setflag[i][j], sizeof(int), 1, fp);
@@ -683,6 +753,7 @@ void PairContact::write_restart(FILE *fp)
 
 void PairContact::read_restart(FILE *fp)
 {
+  read_restart_settings(fp);
   allocate();
   for (int i = 1; i <= atom->ntypes; ++i) {
     for (int j = i; j <= atom->ntypes; ++j) {

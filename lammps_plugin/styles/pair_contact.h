@@ -4,6 +4,7 @@
 #include "contact/instruction_set.hpp"
 #include "contact/math/upper.hpp"
 #include "contact/math/vec.hpp"
+#include "contact/power_law.hpp"
 
 #include "pair.h"
 #include "particle_view.h"
@@ -58,6 +59,8 @@ class PairContact : public LAMMPS_NS::Pair {
   void init_style() override;
   double init_one(int i, int j) override;
   void setup() override;
+  void write_restart_settings(FILE *fp) override;
+  void read_restart_settings(FILE *fp) override;
   void write_restart(FILE *fp) override;
   void read_restart(FILE *fp) override;
   void write_data(FILE *fp) override;
@@ -78,7 +81,7 @@ class PairContact : public LAMMPS_NS::Pair {
   bool particles_turn() const { return any_turns; }
 
   /// Settings behind the name of the style that determine its energy, with a space before.
-  virtual std::string settings_text() const { return ""; }
+  virtual std::string settings_text() const;
 
   /// Report of the work skipped for the present particles, as in the log; empty before the first
   /// evaluation.
@@ -113,6 +116,7 @@ class PairContact : public LAMMPS_NS::Pair {
   Upper cell() const;
   ParticleView particles;
   double **k_e;
+  double power = HARMONIC;  // of the overlap in the energy of a bond
   bool any_turns;
   InstructionSet instructions;
   /// Shortcuts disabled although the present particles do not need the general path: for tests and
@@ -121,14 +125,18 @@ class PairContact : public LAMMPS_NS::Pair {
     bool rotation = false, pairs = false, contact = false;
   } disabled;
 
+  /// Reads the settings common to all shapes: '[law LAW] [disable_shortcuts WHAT ...]'.
+  void read_settings(int narg, char **arg);
   /// Reads 'disable_shortcuts WHAT ...', or nothing without arguments.
   void read_disabled_shortcuts(int narg, char **arg);
   /// Whether a word begins them: 'general' is the name of jamshape 0.1.
   static bool begins_shortcuts(const std::string &word);
+  /// Whether a word begins the settings common to all shapes.
+  static bool begins_settings(const std::string &word);
 
   /// Names of the style, of its energy and of the objects without a contact force, in messages.
   virtual std::string style_name() const = 0;
-  virtual std::string settings_rule() const { return "no arguments: leave them out"; }
+  virtual std::string settings_rule() const { return "'law LAW' or no arguments: leave them out"; }
   virtual std::string energy_name() const { return "k_e"; }
   virtual std::string without_force() const { return "crossing spines or coinciding centres"; }
 
@@ -190,6 +198,7 @@ class PairContact : public LAMMPS_NS::Pair {
   std::string told, said;  // the last line in the log, without and with its numbers
 
   void allocate();
+  int read_law(int narg, char **arg);
   std::string coeff_rule() const;
   void read_form(int narg, char **arg);
   bool read_numbers(const std::string &name, FormNumbers &numbers) const;

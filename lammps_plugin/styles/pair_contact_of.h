@@ -170,7 +170,7 @@ template <class Model> class PairContactOf : public PairContact {
 
   typename Model::Law law_of(int i, int j) const
   {
-    return Model::law(k_e[atom->type[i]][atom->type[j]], sides, !disabled.contact);
+    return Model::law({k_e[atom->type[i]][atom->type[j]], power}, sides, !disabled.contact);
   }
 
   std::vector<std::optional<typename Model::Form>> forms;  // per type
@@ -573,7 +573,7 @@ template <class Model> class PairContactOf : public PairContact {
     typename BodiesOf<Model, D>::Block bodies(all<D>().now);
     fill<D>(block, bodies, begin, n_close());
     block.margin = margin;
-    find(bodies.data(), Model::law(1.0, Sides::ONE), block);
+    find(bodies.data(), Model::law({1.0}, Sides::ONE), block);
     int n_chosen = begin;
     block.for_each(block.touching, [&](int k) {
       owner[n_chosen] = owner[begin + k];

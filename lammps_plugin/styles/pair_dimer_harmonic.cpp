@@ -8,7 +8,7 @@ namespace jamshape {
 
 namespace {
 
-/// pair_style dimer/harmonic; pair_coeff I J k_e
+/// pair_style dimer/harmonic [law LAW]; pair_coeff I J k_e
 class PairDimerHarmonic : public PairContactOf<DimerModel> {
  public:
   using PairContactOf::PairContactOf;

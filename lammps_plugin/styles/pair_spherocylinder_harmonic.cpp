@@ -6,7 +6,7 @@ namespace jamshape {
 
 namespace {
 
-/// pair_style spherocylinder/harmonic sides one|two; pair_coeff I J k_e
+/// pair_style spherocylinder/harmonic sides one|two [law LAW]; pair_coeff I J k_e
 class PairSpherocylinderHarmonic : public PairWithSides<SpherocylinderModel> {
  public:
   using PairWithSides::PairWithSides;

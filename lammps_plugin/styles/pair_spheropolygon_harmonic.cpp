@@ -8,7 +8,7 @@ namespace jamshape {
 
 namespace {
 
-/// pair_style spheropolygon/harmonic sides one|two; pair_coeff I J k_e [polygon]
+/// pair_style spheropolygon/harmonic sides one|two [law LAW]; pair_coeff I J k_e [polygon]
 class PairSpheropolygonHarmonic : public PairWithSides<SpheropolygonModel> {
  public:
   using PairWithSides::PairWithSides;

@@ -8,7 +8,7 @@ namespace jamshape {
 
 namespace {
 
-/// pair_style superellipsoid/harmonic; pair_coeff I J epsilon [p]
+/// pair_style superellipsoid/harmonic [law LAW]; pair_coeff I J epsilon [p]
 class PairSuperellipsoidHarmonic : public PairContactOf<SuperellipsoidModel> {
  public:
   using PairContactOf::PairContactOf;
@@ -18,7 +18,7 @@ class PairSuperellipsoidHarmonic : public PairContactOf<SuperellipsoidModel> {
  protected:
   std::string settings_rule() const override
   {
-    return "no arguments: give exponents with 'pair_coeff I I epsilon p'";
+    return "'law LAW' or no arguments: give exponents with 'pair_coeff I I epsilon p'";
   }
   std::string energy_name() const override { return "epsilon"; }
   std::string without_force() const override { return "coinciding centres"; }

@@ -11,7 +11,8 @@
 
 namespace jamshape {
 
-/// Pair styles of shapes with straight sides: pair_style NAME sides one|two; pair_coeff I J k_e
+/// Pair styles of shapes with straight sides: pair_style NAME sides one|two [law LAW]; pair_coeff I
+/// J k_e
 template <class Model> class PairWithSides : public PairContactOf<Model> {
  public:
   using PairContactOf<Model>::PairContactOf;
@@ -21,13 +22,14 @@ template <class Model> class PairWithSides : public PairContactOf<Model> {
 
   std::string settings_text() const override
   {
-    return this->sides == Sides::ONE ? " sides one" : " sides two";
+    const std::string own = this->sides == Sides::ONE ? " sides one" : " sides two";
+    return own + PairContactOf<Model>::settings_text();
   }
 
   void settings(int narg, char **arg) override
   {
     const std::string keyword = narg >= 2 ? arg[0] : "", value = narg >= 2 ? arg[1] : "";
-    const bool is_longer = narg > 2 && !this->begins_shortcuts(arg[2]);
+    const bool is_longer = narg > 2 && !this->begins_settings(arg[2]);
     if (keyword != "sides" || (value != "one" && value != "two") || is_longer) {
       this->error->all(FLERR,
                        "pair_style " + this->name() + " found '" + joined(narg, arg) +
@@ -35,25 +37,14 @@ template <class Model> class PairWithSides : public PairContactOf<Model> {
                            "(two bonds for side-to-side contacts).");
     }
     this->sides = value == "one" ? Sides::ONE : Sides::TWO;
-    this->read_disabled_shortcuts(narg - 2, arg + 2);
-  }
-
-  void write_restart(FILE *fp) override
-  {
-    write_restart_settings(fp);
-    PairContactOf<Model>::write_restart(fp);
-  }
-
-  void read_restart(FILE *fp) override
-  {
-    read_restart_settings(fp);
-    PairContactOf<Model>::read_restart(fp);
+    this->read_settings(narg - 2, arg + 2);
   }
 
   void write_restart_settings(FILE *fp) override
   {
     const int value = static_cast<int>(this->sides);
     fwrite(&value, sizeof(int), 1, fp);
+    PairContactOf<Model>::write_restart_settings(fp);
   }
 
   void read_restart_settings(FILE *fp) override
@@ -64,6 +55,7 @@ template <class Model> class PairWithSides : public PairContactOf<Model> {
     }
     MPI_Bcast(&value, 1, MPI_INT, 0, this->world);
     this->sides = static_cast<Sides>(value);
+    PairContactOf<Model>::read_restart_settings(fp);
   }
 };
 

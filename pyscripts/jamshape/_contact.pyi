@@ -38,7 +38,13 @@ class _Shape:
     director: _Ints
     @overload
     def __init__(
-        self, diameters: _Reals, form: _Reals, dimension: int, k_e: float, sides: int
+        self,
+        diameters: _Reals,
+        form: _Reals,
+        dimension: int,
+        k_e: float,
+        sides: int,
+        power: float = 2.0,
     ) -> None: ...
     @overload
     def __init__(
@@ -49,10 +55,17 @@ class _Shape:
         k_e: _Reals,
         species: _Ints,
         sides: int,
+        power: float = 2.0,
     ) -> None: ...
     @overload
     def __init__(
-        self, diameters: _Reals, exponent: _Reals, dimension: int, k_e: float, sides: int
+        self,
+        diameters: _Reals,
+        exponent: _Reals,
+        dimension: int,
+        k_e: float,
+        sides: int,
+        power: float = 2.0,
     ) -> None: ...
     @overload
     def __init__(
@@ -63,6 +76,7 @@ class _Shape:
         k_e: _Reals,
         species: _Ints,
         sides: int,
+        power: float = 2.0,
     ) -> None: ...
     def host_spin(self, orientation: _Reals, gradient: _Reals) -> _Reals: ...
     def near(
@@ -140,7 +154,7 @@ def sparse_product(
     first: _Ints, column: _Ints, value: _Reals, dense: _Reals, is_long: bool
 ) -> _Reals: ...
 def spherocylinder_contacts(
-    bodies_i: _Reals, bodies_j: _Reals, k_e: float, sides: int
+    bodies_i: _Reals, bodies_j: _Reals, k_e: float, sides: int, power: float = 2.0
 ) -> _Arrays: ...
 def spine_distances(bodies_i: _Reals, bodies_j: _Reals) -> _Reals: ...
 def superellipsoid_contacts(

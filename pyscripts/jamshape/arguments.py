@@ -203,5 +203,5 @@ def _name(kind: Any) -> str:
 _NAMES = {
     bool: "True or False", int: "a whole number", float: "a number", str: "text", Path: "a path",
     "Particles": "particles such as Particles.of(alpha=4)", "Packing": "a packing",
-    "Recorded": "a run", "Frames": "frames", "Living": "a LAMMPS instance", "Modes": "modes", "Interaction": "Interaction(k_e, sides)",
+    "Recorded": "a run", "Frames": "frames", "Living": "a LAMMPS instance", "Modes": "modes", "Interaction": "Interaction(k_e, sides, power)",
 }  # fmt: skip

@@ -23,8 +23,8 @@ def split(x):
     return np.stack([double, (x - double).astype(float)])
 
 
-def rods(diameters, dimension, k_e=1.0, sides=1, shape=_contact.Spherocylinders):
-    return shape(diameters, np.ones(len(diameters)), dimension, k_e, sides)
+def rods(diameters, dimension, k_e=1.0, sides=1, shape=_contact.Spherocylinders, power=2.0):
+    return shape(diameters, np.ones(len(diameters)), dimension, k_e, sides, power)
 
 
 def quaternion_product(p, q):
@@ -53,6 +53,7 @@ class PairPacking:
     edges: np.ndarray
     shift: np.ndarray
     shape: type = _contact.Spherocylinders  # or another one of these diameters
+    power: float = 2.0
 
     @classmethod
     def of(cls, rng, pairs, shape=_contact.Spherocylinders):
@@ -90,6 +91,7 @@ class PairPacking:
             self.edges,
             self.shift[which],
             self.shape,
+            self.power,
         )
 
     @property
@@ -105,7 +107,7 @@ class PairPacking:
         return (*poses, np.arange(2 * len(self)).reshape(-1, 2), self.shift)
 
     def compiled(self, sides, k_e):
-        return rods(self.diameters, self.dimension, k_e, sides, self.shape)
+        return rods(self.diameters, self.dimension, k_e, sides, self.shape, self.power)
 
     def derivatives(self, sides, k_e, *, extended=True):
         return self.compiled(sides, k_e).derivatives(*self.arguments(), extended)

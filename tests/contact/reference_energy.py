@@ -1,7 +1,7 @@
 """The pair energies written a second time, in NumPy, from the formula and not from the C++.
 
 With overlaps a of the shortest distance and b of the far end of what lies opposite of the spines (b of
-any sign), m = (a + b) / 2, c = u_i.u_j, E(x) = x^2 / 2 and S the quintic step:
+any sign), m = (a + b) / 2, c = u_i.u_j, E(x) = x^A / A, A = 2 unless stated, and S the quintic step:
 
     sides one   V = E(a)
     sides two   V = (E(a)^(1/w) + E(b)^(1/w))^w where b > 0 and w > 0, E(a) elsewhere
@@ -127,8 +127,8 @@ def least_fade_length(pairs):
 class Approach:
     """The two ends of the overlap of the spines, and what their energy is made of."""
 
-    def __init__(self, pairs):
-        self.pairs = pairs
+    def __init__(self, pairs, power=2.0):
+        self.pairs, self.power = pairs, power
         self.plus, self.minus = end_feet(pairs)
 
     @cached_property
@@ -197,9 +197,9 @@ class Approach:
     def shares(self):
         """(M, 2) of the two bonds: V = share_a E(a) + share_b E(b)."""
         w = np.where(self.has_two, self.exponent, 1.0)
-        log_t = 2.0 / w * self.log_ratio
+        log_t = self.power / w * self.log_ratio
         first = np.exp((w - 1.0) * np.log(1.0 + np.exp(log_t)))
-        second = first * np.exp(log_t - 2.0 * self.log_ratio)
+        second = first * np.exp(log_t - self.power * self.log_ratio)
         return np.where(self.has_two, [first, second], [[1.0], [0.0]]).T
 
     @cached_property
@@ -248,23 +248,24 @@ def overlap_of(square, d):
     return (d - np.sqrt(square)) / d
 
 
-def law(overlap):
-    return 0.5 * overlap**2
+def law(overlap, power=2.0):
+    return overlap**power / power
 
 
-def repulsive_law(overlap):
-    return np.where(overlap.real > 0.0, law(overlap), 0.0)
+def repulsive_law(overlap, power=2.0):
+    touches = overlap.real > 0.0
+    return np.where(touches, law(np.where(touches, overlap, 1.0), power), 0.0)
 
 
-def one_bond_energy(pairs):
-    return repulsive_law(Approach(pairs).overlap)
+def one_bond_energy(pairs, power=2.0):
+    return repulsive_law(Approach(pairs).overlap, power)
 
 
-def two_bond_energy(pairs):
-    x = Approach(pairs)
+def two_bond_energy(pairs, power=2.0):
+    x = Approach(pairs, power)
     w = np.where(x.has_two, x.exponent, 1.0)
-    t = np.exp(2.0 / w * x.log_ratio)
-    return repulsive_law(x.overlap) * np.where(x.has_two, np.exp(w * np.log(1.0 + t)), 1.0)
+    t = np.exp(power / w * x.log_ratio)
+    return repulsive_law(x.overlap, power) * np.where(x.has_two, np.exp(w * np.log(1.0 + t)), 1.0)
 
 
 def printed_two_bond_energy(pairs):

@@ -105,23 +105,24 @@ class BuiltPairs(Pairs):
                           overlap=self.overlap)  # fmt: skip
 
 
-def contacts(pairs, sides, k_e=1.0):
-    return _contact.spherocylinder_contacts(*pairs.bodies(), k_e, sides)
+def contacts(pairs, sides, k_e=1.0, power=2.0):
+    return _contact.spherocylinder_contacts(*pairs.bodies(), k_e, sides, power)
 
 
 def energies(pairs, sides, k_e=1.0):
     return contacts(pairs, sides, k_e)["energy"]
 
 
-def force_scale(pairs, result, k_e):
+def force_scale(pairs, result, k_e, power=2.0):
     """The force of one bond of the built overlap, or the force if that is larger."""
-    return np.maximum(k_e * pairs.overlap / pairs.d, np.linalg.norm(result["force"], axis=1))
+    of_one = k_e * pairs.overlap ** (power - 1.0) / pairs.d
+    return np.maximum(of_one, np.linalg.norm(result["force"], axis=1))
 
 
-def relative_errors(pairs, result, gradient, k_e):
+def relative_errors(pairs, result, gradient, k_e, power=2.0):
     """Largest error of each pair: of the force over its scale, of the torques over force (A + R)."""
     by_r, by_i, by_j = gradient
-    force = force_scale(pairs, result, k_e)
+    force = force_scale(pairs, result, k_e, power)
     return np.max([
         np.abs(by_r + result["force"]).max(axis=1) / force,
         np.abs(by_i + result["torque_i"]).max(axis=1) / (force * (pairs.A_i + pairs.R_i)),

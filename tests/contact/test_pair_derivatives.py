@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -226,9 +227,13 @@ LEAST_SMOOTH = 0.7
 LEAST_RESOLVED = 0.3
 
 
+@pytest.mark.parametrize("power", [2.0, 2.5])
 @EVERY_CASE
-def test_second_derivatives_are_differences_of_force_and_torques(case, dimension, sides, measured):
-    packing, found = packing_of(case, dimension), found_in(case, dimension, sides)
+def test_second_derivatives_are_differences_of_force_and_torques(
+    case, dimension, sides, power, measured
+):
+    packing = replace(packing_of(case, dimension), power=power)
+    found = packing.derivatives(sides, K_E)
     h = steps(packing, sides)
     resolved = are_resolved(packing, h)
     smooth = is_smooth_around(packing, h, sides) & resolved
@@ -247,19 +252,23 @@ def nearly_discs(rng, dimension):
     return deep(rng, N, dimension, overlaps(rng, N), depth=(1e2, 1e10))
 
 
+@pytest.mark.parametrize("power", [2.0, 3.0])
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("sides", [1, 2])
 def test_second_derivatives_are_those_of_the_energy_written_a_second_time(
-    dimension, sides, measured
+    dimension, sides, power, measured
 ):
     rng = np.random.default_rng([42, dimension])
     cases = [case for case, D, s in CASES if (D, s) == (dimension, sides)]
     cases += [nearly_discs] * (sides == 2)  # within |sin| = 1e-8, one bond has a kink
     packing = PairPacking.of(rng, concatenated(*(case(rng, dimension)[:40] for case in cases)))
+    packing = replace(packing, power=power)
 
     def gradient(packing):
         return np.hstack(
-            complex_step_gradient(packing.plain(), lambda pairs: K_E * ENERGIES[sides](pairs))
+            complex_step_gradient(
+                packing.plain(), lambda pairs: K_E * ENERGIES[sides](pairs, power)
+            )
         )
 
     h = steps(packing, sides)

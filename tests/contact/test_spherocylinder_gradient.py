@@ -71,17 +71,19 @@ def one_sided_comparison(pairs, sides):
     return beyond, jump
 
 
+@pytest.mark.parametrize("power", [2.0, 2.5, 3.0])
 @pytest.mark.parametrize(("dimension", "sides", "kind"), EVERY_CLASS)
 def test_force_and_torques_are_derivatives_of_the_energy_written_a_second_time(
-    dimension, sides, kind, measured
+    dimension, sides, kind, power, measured
 ):
     pairs = touching(dimension, sides, kind)
     assert len(pairs) >= N
-    result = contacts(pairs, sides, K_E)
-    energy = ENERGIES[sides](pairs)
-    energy_errors = np.abs(result["energy"] / K_E - energy) / energy_rounding(pairs, sides, energy)
-    gradient = complex_step_gradient(pairs, lambda stepped: K_E * ENERGIES[sides](stepped))
-    errors = relative_errors(pairs, result, gradient, K_E)
+    result = contacts(pairs, sides, K_E, power)
+    energy = ENERGIES[sides](pairs, power)
+    rounding = energy_rounding(pairs, sides, energy, power)
+    energy_errors = np.abs(result["energy"] / K_E - energy) / rounding
+    gradient = complex_step_gradient(pairs, lambda stepped: K_E * ENERGIES[sides](stepped, power))
+    errors = relative_errors(pairs, result, gradient, K_E, power)
     measured(worst=errors.max(), median=np.median(errors), pairs=len(pairs),
              energy_in_roundings=energy_errors.max())  # fmt: skip
     assert energy_errors.max() < 4.0
@@ -89,10 +91,10 @@ def test_force_and_torques_are_derivatives_of_the_energy_written_a_second_time(
     assert np.median(errors) < 1e-14
 
 
-def energy_rounding(pairs, sides, energy):
+def energy_rounding(pairs, sides, energy, power=2.0):
     """Uncertainty of the energy at k_e = 1 due to rounding of coordinates."""
     rounding = EPS * pairs.extent
-    result = np.sqrt(2.0 * energy) * rounding / pairs.d
+    result = (power * energy) ** (1.0 - 1.0 / power) * rounding / pairs.d
     if sides == 2:
         fading = Approach(pairs).by_steps < 1.0
         result[fading] += (4.0 * energy * rounding / fade_length(pairs))[fading]

@@ -5,9 +5,10 @@ from feature import BOX, CROWD, HEAD, LAW, LOAD, RODS, Feature
 _STYLE = "pair_style spherocylinder/harmonic sides two\npair_coeff * * 1.0"
 _IS = "pair_style spherocylinder/harmonic found"
 
-# A tip 0.8 away from the spine of the other rod: V = (1 - 0.8)^2 / 2.
+# A tip 0.8 away from the spine of the other rod: V = (1 - 0.8)^2 / 2, by Hertz's law (1 - 0.8)^(5/2) / (5/2).
 _TIP = "set type 2 quat 0 0 1 90\nset type 2 y 12.8"
 _ENERGY = 0.02
+_HERTZ = 0.2**2.5 / 2.5
 
 
 def _rods(atom_style: str = "ellipsoid", law: str = LAW, before: str = "", box: str = BOX) -> str:
@@ -181,4 +182,33 @@ _COMPUTES = (
             "c_s", _ENERGY, scene=_TWO),
 )  # fmt: skip
 
-CONTACTS = (*_ATOMS, *_PAIRS, *_FILES, *_FIXES, *_COMPUTES)
+_ONLY = "expected 'law harmonic', 'law hertz' or 'law power A' with A >= 2: .*"
+
+
+def _read_restart(style: str) -> str:
+    """Write the commands that read a restart file, whose pair style goes on without being given again."""
+    return f"run 0\nwrite_restart x.restart\nclear\n{LOAD}\nread_restart x.restart\n{style}thermo_modify norm no\nneighbor 0.3 bin\nrun 0"
+
+
+_LAWS = (
+    Feature("`law harmonic`", f"{_STYLE.replace('two', 'two law harmonic', 1)}\nrun 0", "pe", _ENERGY, scene=_TWO),
+    Feature("`law hertz`", f"{_STYLE.replace('two', 'two law hertz', 1)}\nrun 0", "pe", _HERTZ, scene=_TWO),
+    Feature("`law power 3`", f"{_STYLE.replace('two', 'one law power 3', 1)}\nrun 0", "pe", 0.2**3 / 3, scene=_TWO),
+    Feature("`law power 2`", f"{_STYLE.replace('two', 'two law power 2', 1)}\nrun 0", "pe", _ENERGY, scene=_TWO),
+    Feature("`law hertz` of superellipsoids", "pair_style superellipsoid/harmonic law hertz\npair_coeff * * 1.0 2.0\nrun 0", "pe", (1 - 0.9**2) ** 2.5 / 2.5,
+            scene=_SUPER),
+    Feature("`law hertz disable_shortcuts contact`", f"{_STYLE.replace('two', 'two law hertz disable_shortcuts contact', 1)}\nrun 0", "pe", _HERTZ, scene=_TWO),
+    Feature("`law hertz`, restart file", f"{_STYLE.replace('two', 'two law hertz', 1)}\n{_read_restart('')}", "pe", _HERTZ, scene=_TWO),
+    Feature("`law power 3` of superellipsoids, restart file", f"pair_style superellipsoid/harmonic law power 3\npair_coeff * * 1.0 2.0\n{_read_restart('')}", "pe",
+            (1 - 0.9**2) ** 3 / 3, scene=_SUPER),
+    Feature("`pair_style hybrid` with `law hertz`, restart file", f"{_HYBRID.replace('two', 'two law hertz', 1)}\nrun 0\nwrite_restart x.restart\nclear\n{LOAD}\n"
+            "read_restart x.restart\npair_coeff * * spherocylinder/harmonic 1.0\npair_coeff * 2 lj/cut 1 1\nthermo_modify norm no\nrun 0", "pe", _HERTZ + _LJ,
+            scene=_BARE),
+    Feature("`law hertz`, virial", f"{_STYLE.replace('two', 'two law hertz', 1)}\nthermo_style custom step pyy lx ly\nrun 0", "pyy*lx*ly", 0.2**1.5 * 2.8, scene=_TWO),
+    Feature("`law power 1.5`", _STYLE.replace("two", "two law power 1.5", 1), refused=f"{_IS} 'law power 1.5', {_ONLY}", scene=_TWO),
+    Feature("`law hertzian`", _STYLE.replace("two", "two law hertzian", 1), refused=f"{_IS} 'law hertzian', {_ONLY}", scene=_TWO),
+    Feature("`law`", "pair_style dimer/harmonic law", refused=f"pair_style dimer/harmonic found 'law', {_ONLY}", scene=_TWO),
+    Feature("`law power`", "pair_style dimer/harmonic law power", refused=f"pair_style dimer/harmonic found 'law power', {_ONLY}", scene=_TWO),
+)  # fmt: skip
+
+CONTACTS = (*_ATOMS, *_PAIRS, *_LAWS, *_FILES, *_FIXES, *_COMPUTES)

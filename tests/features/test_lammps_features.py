@@ -25,6 +25,7 @@ DAILY = {
     "`pair_style hybrid`, other atoms without a shape", "`special_bonds lj 0.5`", "`write_coeff`",
     "`write_data`, `read_data`", "restart file to data file, in a deck", "`rerun` of rods",
     "`fix setforce 0 0 0`, `minimize`", "`fix freeze`, `minimize`", "`fix adapt` of mixed k_e",
+    "`law hertz`", "`law hertz`, restart file", "`law power 3` of superellipsoids, restart file", "`law power 1.5`",
     "`fix deposit`", "`set shape` before `run pre no`", "`fix rigid` in the plane",
 }  # fmt: skip
 

@@ -106,3 +106,18 @@ def test_a_slow_box_lags_and_times_are_reported(report, tmp_path):
     assert slow["spread_over_p"] > 0
     assert abs(usual["p_yy_over_p"] - 1) < 0.3
     assert (tmp_path / "p.png").stat().st_size > 1e4
+
+
+def test_powers_follow_from_the_law(report, tmp_path):
+    found = report(
+        "stress/law_scaling.py", "--laws", "hertz", "power 3", "--n", 16, "--samples", 2, "--overlaps", 1e-5, 1e-3,
+        "--points", 4, "--fit-contacts", 1e-5, 1e-2, "--runs", tmp_path / "runs", "--out", tmp_path / "p.png",
+    )["systems"]  # fmt: skip
+    assert [of["law"] for of in found] == ["hertz", "power 3"]
+    for of, A in zip(found, (2.5, 3.0), strict=True):
+        expected = {"pressure": A - 1, "omega": (A - 2) / 2, "bulk": A - 2}
+        for name, power in expected.items():
+            assert of["powers"][name]["expected"] == pytest.approx(power)
+            assert of["powers"][name]["power"] == pytest.approx(power, abs=0.01)
+        assert of["points"][0]["excess"] == pytest.approx(0, abs=1e-12)
+    assert (tmp_path / "p.png").stat().st_size > 1e4

@@ -8,6 +8,7 @@ from every_shape import (
     EPS,
     MIXTURES,
     ROUNDING,
+    SIDES,
     TYPICAL,
     as_vectors,
     close_to,
@@ -28,8 +29,10 @@ WANTED = {"hessian": True, "compatibility": True}
 
 
 def by_each_law(packing):
-    """The packing with a stiffness other than 1, and each number of bonds side to side."""
-    return [packing.with_(law=js.Interaction(2.5, sides)) for sides in laws(packing)]
+    """The packing with a stiffness other than 1, each number of bonds side to side, and Hertz's law."""
+    harmonic = [js.Interaction(2.5, sides) for sides in laws(packing)]
+    hertz = js.Interaction(2.5, SIDES, "hertz")
+    return [packing.with_(law=law) for law in (*harmonic, hertz)]
 
 
 def step_of(packing):

@@ -221,7 +221,7 @@ OF_BODIES = "pair_coeff of superellipsoid/harmonic found "
     [
         (
             "pair_style superellipsoid/harmonic p 1.5",
-            ("pair_style superellipsoid/harmonic found 'p 1.5', expected no arguments: give exponents "
+            ("pair_style superellipsoid/harmonic found 'p 1.5', expected 'law LAW' or no arguments: give exponents "
             "with 'pair_coeff I I epsilon p'."),
         ),
         *((f"pair_coeff {words}",

@@ -34,6 +34,8 @@ struct Quad {
 
   friend Quad sqrt(Quad a) { return sqrtq(a.v); }
   friend Quad pow(Quad a, Quad b) { return powq(a.v, b.v); }
+  friend Quad log1p(Quad a) { return log1pq(a.v); }
+  friend Quad expm1(Quad a) { return expm1q(a.v); }
   friend Quad abs(Quad a) { return fabsq(a.v); }
   friend Quad copysign(Quad a, Quad b) { return copysignq(a.v, b.v); }
   friend Quad floor(Quad a) { return floorq(a.v); }

@@ -55,7 +55,7 @@ template <int D> class Reference {
     const TangencySearch<D, Quad> search(i, j, TangencyWish<D, Quad>{r, false, nullptr});
     FoundTangency<D, Quad> found = start;
     if (!search.improve(found)) found = search.find();
-    const TangencyLoad<D, Quad> load(found.at, r, HarmonicOf<double>{1.0});
+    const TangencyLoad<D, Quad> load(found.at, r, PowerLawOf<double>{1.0});
     auto contact = without_bonds<D, Quad, 1>(ContactStatus::TOUCHING);
     contact.n_bonds = 1;
     contact.energy = load.energy;
@@ -78,7 +78,7 @@ template <int D> class Reference {
     for (int k = 0; k < D; ++k) put(found.force[k]);
     for (int k = 0; k < ROTATIONS<D>; ++k) put(found.torque_i[k]);
     for (int k = 0; k < ROTATIONS<D>; ++k) put(found.torque_j[k]);
-    const ContactErrors errors = errors_of(i, j, found, found);
+    const ContactErrors errors = errors_of(i, j, found, found, PowerLaw{1.0});
     numbers.insert(numbers.end(), {errors.energy, errors.force, errors.torque});
     std::fwrite(numbers.data(), sizeof(double), numbers.size(), stdout);
   }

@@ -4,10 +4,10 @@
 #include "contact/clump/form.hpp"
 #include "contact/compiled_once.hpp"
 #include "contact/contact.hpp"
-#include "contact/harmonic.hpp"
 #include "contact/math/region.hpp"
 #include "contact/math/rotation.hpp"
 #include "contact/math/vec.hpp"
+#include "contact/power_law.hpp"
 
 #include <algorithm>
 #include <array>
@@ -104,12 +104,12 @@ void each_two_discs(const ClumpBody<D, T> &i, const ClumpBody<D, T> &j, double m
 }
 
 struct ClumpLaw {
-  Harmonic harmonic;
+  PowerLaw bond;
 };
 
 inline constexpr int MOST_BONDS_OF_CLUMPS = 16;
 
-/// Contact of two clumps: V is the sum of harmonic energies of the overlaps 1 - r/d of all pairs of
+/// Contact of two clumps: V is the sum of the energies of the overlaps 1 - r/d of all pairs of
 /// discs, each a bond along the line of centres.
 template <int D, class S>
 Contact<D, S, MOST_BONDS_OF_CLUMPS> contact_of(const ClumpBody<D, S> &i, const ClumpBody<D, S> &j,
@@ -119,8 +119,7 @@ Contact<D, S, MOST_BONDS_OF_CLUMPS> contact_of(const ClumpBody<D, S> &i, const C
   const Vec<D, S> r = i.centre - j.centre;
   const auto add = [&](int a, int b) {
     const Vec<D, S> arm_i = i.arm(a), arm_j = j.arm(b);
-    add_disc_bond(contact, {arm_i, arm_j, r + arm_i - arm_j, i.radius(a), j.radius(b)},
-                  law.harmonic);
+    add_disc_bond(contact, {arm_i, arm_j, r + arm_i - arm_j, i.radius(a), j.radius(b)}, law.bond);
     return contact.status != ContactStatus::CROSSING;
   };
   if constexpr (std::is_same_v<S, ValueOf<S>>) {
@@ -154,7 +153,7 @@ struct ClumpModel {
   static constexpr int OVERLAP_POWER = 1;
   template <int D> static constexpr bool HAS_KINKS = false;
 
-  static Law law(double k_e, Sides, bool /*shortcuts*/ = true) { return {{k_e}}; }
+  static Law law(const PowerLaw &bond, Sides, bool /*shortcuts*/ = true) { return {bond}; }
 
   static std::optional<Shape> shape_from(const Vec<3> &semi_axes, const Form &form)
   {

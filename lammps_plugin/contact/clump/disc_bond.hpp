@@ -1,8 +1,8 @@
 #pragma once
 
 #include "contact/contact.hpp"
-#include "contact/harmonic.hpp"
 #include "contact/math/vec.hpp"
+#include "contact/power_law.hpp"
 
 namespace jamshape {
 
@@ -13,11 +13,11 @@ template <int D, class S> struct TwoDiscs {
   double radius_i, radius_j;
 };
 
-/// Adds the bond of two discs to the contact of their bodies if they touch: of the harmonic energy
-/// of the overlap 1 - r/d, along the line of centres. Coinciding centres, and more bonds than a
+/// Adds the bond of two discs to the contact of their bodies if they touch: of the energy of
+/// the overlap 1 - r/d, along the line of centres. Coinciding centres, and more bonds than a
 /// contact holds, leave it without any.
 template <int D, class S, int BONDS>
-void add_disc_bond(Contact<D, S, BONDS> &contact, const TwoDiscs<D, S> &discs, const Harmonic &law)
+void add_disc_bond(Contact<D, S, BONDS> &contact, const TwoDiscs<D, S> &discs, const PowerLaw &law)
 {
   if (contact.status == ContactStatus::CROSSING) return;
   const double reach = discs.radius_i + discs.radius_j;

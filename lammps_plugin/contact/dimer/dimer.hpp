@@ -4,8 +4,8 @@
 #include "contact/clump/disc_bond.hpp"
 #include "contact/compiled_once.hpp"
 #include "contact/contact.hpp"
-#include "contact/harmonic.hpp"
 #include "contact/math/vec.hpp"
+#include "contact/power_law.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -58,10 +58,10 @@ template <int D, class S> Vec<D, S> to_disc(const DimerBody<D, S> &body, int whi
 }
 
 struct DimerLaw {
-  Harmonic harmonic;
+  PowerLaw bond;
 };
 
-/// Contact of two dimers: V is the sum of harmonic energies of the overlaps 1 - r/d of up to four
+/// Contact of two dimers: V is the sum of the energies of the overlaps 1 - r/d of up to four
 /// pairs of discs, each a bond along the line of centres.
 template <int D, class S>
 Contact<D, S, 4> contact_of(const DimerBody<D, S> &i, const DimerBody<D, S> &j, const DimerLaw &law)
@@ -72,7 +72,7 @@ Contact<D, S, 4> contact_of(const DimerBody<D, S> &i, const DimerBody<D, S> &j, 
     const Vec<D, S> arm_i = to_disc(i, a);
     for (int b = 0; b < 2; ++b) {
       const Vec<D, S> arm_j = to_disc(j, b);
-      add_disc_bond(contact, {arm_i, arm_j, r + arm_i - arm_j, i.radius, j.radius}, law.harmonic);
+      add_disc_bond(contact, {arm_i, arm_j, r + arm_i - arm_j, i.radius, j.radius}, law.bond);
     }
   }
   return contact;
@@ -93,7 +93,7 @@ struct DimerModel : AlongX<Dimer> {
   /// share.
   static constexpr bool BONDS_ARE_CONTACTS = true;
 
-  static Law law(double k_e, Sides, bool /*shortcuts*/ = true) { return {{k_e}}; }
+  static Law law(const PowerLaw &bond, Sides, bool /*shortcuts*/ = true) { return {bond}; }
 
   template <int D> static Shortcut shortcut(const Shape &) { return Shortcut::NONE; }
 

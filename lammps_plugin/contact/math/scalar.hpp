@@ -11,6 +11,7 @@ namespace jamshape {
 using std::abs;
 using std::copysign;
 using std::exp;
+using std::expm1;
 using std::floor;
 using std::isfinite;
 using std::log;

@@ -39,7 +39,7 @@ SpherocylinderContact<D, Pack> pairs_of(const SpherocylinderBody<D> *bodies,
   SpinePair<D, Pack> pair{{}, i.axis, i.half_length, j.axis, j.half_length};
   for (int a = 0; a < D; ++a) pair.r[a] = Pack::load(block.separation[a] + first);
   const SpherocylinderLawOf<Pack> of_lanes{
-      {Pack::load(block.k_e + first)}, law.sides, law.shortcuts};
+      {Pack::load(block.k_e + first), law.bond.power}, law.sides, law.shortcuts};
   return {pair, i.radius, j.radius + block.margin, of_lanes};
 }
 

@@ -115,19 +115,19 @@ S log_ratio_of(const SpinePair<D, S> &p, const Feet<D, S> &near, const Feet<D, S
   return any(little) ? select(little, log1p(-lost), of_overlaps) : of_overlaps;
 }
 
-/// The norm V = (E(a)^(1/w) + E(b)^(1/w))^w of harmonic energies, from ln(b / a): their fractions
-/// of the sum, shares in V = share_a E(a) + share_b E(b), and d ln V / dw, the entropy of the
-/// fractions.
+/// The norm V = (E(a)^(1/w) + E(b)^(1/w))^w of two energies that grow as a power of the overlap,
+/// from ln(b / a): their fractions of the sum, shares in V = share_a E(a) + share_b E(b), and d ln
+/// V / dw, the entropy of the fractions.
 template <class S> struct EndNorm {
   S part_a, part_b, share_a, share_b, entropy;
 
-  EndNorm(const S &log_ratio, const S &w)
+  EndNorm(const S &log_ratio, const S &w, double power)
   {
-    const S log_t = 2.0 / w * log_ratio, t = exp(log_t), log_sum = log1p(t);
+    const S log_t = power / w * log_ratio, t = exp(log_t), log_sum = log1p(t);
     part_a = 1.0 / (1.0 + t);
     part_b = t * part_a;
     share_a = exp((w - 1.0) * log_sum);
-    share_b = exp(log_t - 2.0 * log_ratio) * share_a;
+    share_b = exp(log_t - power * log_ratio) * share_a;
     entropy = log_sum - part_b * log_t;
   }
 };

@@ -3,11 +3,11 @@
 #include "contact/along_x.hpp"
 #include "contact/compiled_once.hpp"
 #include "contact/contact.hpp"
-#include "contact/harmonic.hpp"
 #include "contact/instruction_set.hpp"
 #include "contact/math/rotation.hpp"
 #include "contact/math/vec.hpp"
 #include "contact/packs.hpp"
+#include "contact/power_law.hpp"
 #include "contact/spherocylinder/segment_segment.hpp"
 #include "contact/spherocylinder/side_to_side.hpp"
 
@@ -56,7 +56,7 @@ template <> inline SubstrateDrag substrate_drag<3>(const Spherocylinder &shape)
 template <int D, class S = double> using SpherocylinderBody = BodyAlongX<Spherocylinder, D, S>;
 
 template <class K> struct SpherocylinderLawOf {
-  HarmonicOf<K> harmonic;
+  PowerLawOf<K> bond;
   Sides sides;
   bool shortcuts;  // false: also discs by the search for feet
   /// In 2D a tip, as numbered by `TipFeet`: the farther end of two bonds, or the single bond, is
@@ -85,7 +85,7 @@ template <int D, class S> ContactKind kind_of(const SpinePair<D, S> &p, const Fe
 }
 
 /// Contact of two spherocylinders in 2D or 3D. With overlaps a of the shortest distance of the
-/// spines and b at the far end of their facing portions, E the harmonic law:
+/// spines and b at the far end of their facing portions, E the law of a bond:
 ///     Sides::ONE  V = E(a)                                  (Marschall & Teitel 2018, Eqs. 3, 5,
 ///     22) Sides::TWO  V = (E(a)^(1/w) + E(b)^(1/w))^w, E(a) where b <= 0
 /// w is the `EndExponent`: 1, the paper's two bonds (Fig. 6), for overlaps far below A_min^2 / d of
@@ -307,19 +307,23 @@ template <int D, class S> class SpherocylinderContact {
                     const EndExponent<S> &w) const
   {
     const S log_ratio = log_ratio_of(pair, closest, far_end, reach);
-    const EndNorm<S> norm(log_ratio, w.value);
+    const EndNorm<S> norm(log_ratio, w.value, law.bond.power);
     // In dual numbers the derivatives of the shares with respect to the overlaps are left out:
     // `coupling` accounts for them.
-    const EndNorm<S> fixed(constant(log_ratio), w.value);
+    const EndNorm<S> fixed(constant(log_ratio), w.value, law.bond.power);
     const S distance = sqrt(closest.distance_sq), far_distance = sqrt(far_end.distance_sq);
-    const S energy = norm.share_a * law.harmonic.energy(overlap_at(distance)) +
-                     norm.share_b * law.harmonic.energy(overlap_at(far_distance));
+    const S energy = norm.share_a * law.bond.energy(overlap_at(distance)) +
+                     norm.share_b * law.bond.energy(overlap_at(far_distance));
     const S by_exponent = energy * norm.entropy, by_overlap = 0.5 * by_exponent * w.by_mean;
     // Coefficient of the norm's exponent over the overlaps, less that of two bonds.
     const ValueOf<S> curved = most(ValueOf<S>(2.0 / value_of(w.value) - 2.0), ValueOf<S>(0.0));
-    const ValueOf<S> root = sqrt(curved * law.harmonic.k_e) * value_of(inverse_reach);
-    const ValueOf<S> coupling_a = root * sqrt(value_of(fixed.part_b * fixed.share_a));
-    const ValueOf<S> coupling_b = -root * sqrt(value_of(fixed.part_a * fixed.share_b));
+    const auto root = [&](const S &apart, const S &fraction) {
+      const ValueOf<S> stiffness = law.bond.energy_hessian(value_of(overlap_at(apart)));
+      return sqrt(law.bond.steepness() * curved * stiffness) * value_of(inverse_reach) *
+             sqrt(value_of(fraction));
+    };
+    const ValueOf<S> coupling_a = root(distance, fixed.part_b * fixed.share_a);
+    const ValueOf<S> coupling_b = -root(far_distance, fixed.part_a * fixed.share_b);
 
     const S per_i = by_exponent * w.by_along_i, per_j = by_exponent * w.by_along_j;
     const Torque<D, S> turn = (by_exponent * w.by_cosine) * cross(pair.u_i, pair.u_j);
@@ -377,10 +381,10 @@ template <int D, class S> class SpherocylinderContact {
     // In dual numbers the slope of the law is left out here: `own_stiffness` accounts for it, so
     // that the derivatives of force and torque hold the small remainder, not its sum with a large
     // number.
-    const S slope = part.share * law.harmonic.energy_gradient(constant(overlap)) + part.slope;
+    const S slope = part.share * law.bond.energy_gradient(constant(overlap)) + part.slope;
     const S size = slope * inverse_reach;
     const Vec<D, S> force = size * normal;
-    const S energy = part.share * law.harmonic.energy(overlap);
+    const S energy = part.share * law.bond.energy(overlap);
     to.energy += energy;
     to.force += force;
     to.torque_i += feet.s * cross(pair.u_i, force);
@@ -406,7 +410,7 @@ template <int D, class S> class SpherocylinderContact {
     bond.distance = distance;
     bond.reach = reach;
     bond.energy = load.energy;
-    const S bend = law.harmonic.energy_hessian(load.overlap) * inverse_reach * inverse_reach;
+    const S bend = law.bond.energy_hessian(load.overlap) * inverse_reach * inverse_reach;
     bond.stiffness = bond.own_stiffness = part.share * bend;
     bond.coupling = part.coupling;
     bond.on_side_i = abs(feet.s) < pair.A_i;
@@ -439,11 +443,10 @@ struct SpherocylinderModel : AlongX<Spherocylinder> {
   static constexpr bool BONDS_ARE_CONTACTS = false;
 
   /// Without shortcuts, the search also runs for particles whose contacts have a closed form.
-  static Law law(double k_e, Sides sides, bool shortcuts = true)
+  static Law law(const PowerLaw &bond, Sides sides, bool shortcuts = true)
   {
-    return {{k_e}, sides, shortcuts};
+    return {bond, sides, shortcuts};
   }
-  static double k_e(const Law &law) { return law.harmonic.k_e; }
 
   /// In 2D the energy of a pair is the largest of several smooth pieces near its kinks, one for
   /// each tip. The number of the one that it lies on; -1 without a contact that may have a kink.

@@ -218,9 +218,9 @@ struct SpheropolygonModel {
   static constexpr int OVERLAP_POWER = 1;
   template <int D> static constexpr bool HAS_KINKS = false;
 
-  static Law law(double k_e, Sides sides, bool shortcuts = true)
+  static Law law(const PowerLaw &bond, Sides sides, bool shortcuts = true)
   {
-    return {{k_e}, sides, shortcuts};
+    return {bond, sides, shortcuts};
   }
   static double k_e(const Law &law) { return law.harmonic.k_e; }
 

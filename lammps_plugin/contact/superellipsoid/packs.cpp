@@ -136,8 +136,8 @@ void add_load(ContactLanes<D, Pack> &lanes, const TangencyLoad<D, Pack> &load, b
 }
 
 template <int D>
-ContactLanes<D, Pack> contacts_of(const SuperellipsoidBody<D> *bodies, ContactBlock<D> &block,
-                                  int first)
+ContactLanes<D, Pack> contacts_of(const SuperellipsoidBody<D> *bodies, double power,
+                                  ContactBlock<D> &block, int first)
 {
   const int *const i = block.i + first, *const j = block.j + first;
   PairLanes<D> pairs{sizes_of(bodies, i), sizes_of(bodies, j), {}, {}};
@@ -165,7 +165,7 @@ ContactLanes<D, Pack> contacts_of(const SuperellipsoidBody<D> *bodies, ContactBl
   }
   lanes.touching = (of.found & (of.at.scale < Pack(1.0))) | lanes.alone;
   if (!any(lanes.touching)) return lanes;
-  add_load(lanes, {of.at, pairs.r, {Pack::load(block.k_e + first)}}, !round);
+  add_load(lanes, {of.at, pairs.r, {Pack::load(block.k_e + first), power}}, !round);
   return lanes;
 }
 
@@ -175,11 +175,12 @@ ContactLanes<D, Pack> contacts_of(const SuperellipsoidBody<D> *bodies, ContactBl
 /// exists under a name that other files share.
 template <InstructionSet SET, int D>
 [[gnu::flatten]] void find_superellipsoid_contacts(const SuperellipsoidBody<D> *bodies,
-                                                   const SuperellipsoidLaw &,
+                                                   const SuperellipsoidLaw &law,
                                                    ContactBlock<D> &block)
 {
-  block.find(LANES,
-             [&](ContactBlock<D> &of, int first) { return contacts_of<D>(bodies, of, first); });
+  block.find(LANES, [&](ContactBlock<D> &of, int first) {
+    return contacts_of<D>(bodies, law.bond.power, of, first);
+  });
 }
 
 template FindContacts<SuperellipsoidModel, 2>

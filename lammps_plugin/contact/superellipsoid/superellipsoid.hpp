@@ -2,10 +2,10 @@
 
 #include "contact/compiled_once.hpp"
 #include "contact/contact.hpp"
-#include "contact/harmonic.hpp"
 #include "contact/instruction_set.hpp"
 #include "contact/math/vec.hpp"
 #include "contact/packs.hpp"
+#include "contact/power_law.hpp"
 #include "contact/superellipsoid/errors.hpp"
 #include "contact/superellipsoid/shape.hpp"
 #include "contact/superellipsoid/tangency.hpp"
@@ -17,11 +17,11 @@
 
 namespace jamshape {
 
-/// U = epsilon/2 (1 - eta^2)^2 for eta < 1 (Yuan et al. 2019, Eq. 2), eta the scale at which the
-/// two bodies, scaled about their centres, touch (Perram & Wertheim 1985): the harmonic law of the
-/// overlap 1 - eta^2.
+/// Law of the overlap 1 - eta^2, eta < 1 the scale at which the two bodies, scaled about their
+/// centres, touch (Perram & Wertheim 1985): harmonic in Yuan et al. 2019, Eq. 2, U = epsilon/2 (1 -
+/// eta^2)^2.
 struct SuperellipsoidLaw {
-  double epsilon;
+  PowerLaw bond;
   bool shortcuts;  // false: also spheres and ellipsoids by the search for all exponents
 };
 
@@ -43,7 +43,7 @@ template <int D, class S> struct TangencyLoad {
   Vec<D, S> gradient, force, arm_i, arm_j;
   Torque<D, S> torque_i, torque_j;
 
-  TangencyLoad(const Tangency<D, S> &at, const Vec<D, S> &r, const HarmonicOf<Plain<S>> &law) :
+  TangencyLoad(const Tangency<D, S> &at, const Vec<D, S> &r, const PowerLawOf<Plain<S>> &law) :
       x(at.scale * at.scale), overlap((1.0 - at.scale) * (1.0 + at.scale)),
       energy(law.energy(overlap)), gradient((2.0 * x / dot(r, at.normal)) * at.normal),
       force(law.energy_gradient(constant(overlap)) * gradient), arm_i(-at.point_i),
@@ -56,9 +56,9 @@ template <int D, class S> struct TangencyLoad {
 /// bodies touch, grad_r x = 2 x n / (r.n): the printed force (Yuan et al. 2019, Eq. 3) lacks one
 /// eta. By the envelope theorem the torques are those of this force at the point of tangency of the
 /// **scaled** bodies. Normal and levers of the one bond are the gradient of x over |grad_r x|, that
-/// of a length; its reach is 1 / |grad_r x|, so that the stiffness is epsilon / reach^2 as for
-/// other laws; its distance is reach times x, so that 1 - distance / reach is the overlap. For two
-/// spheres of contact distance d the distance is r / 2, and the reach d / 2 where they touch.
+/// of a length; its reach is 1 / |grad_r x|, so that the stiffness is E'' / reach^2 as for
+/// other shapes; its distance is reach times x, so that 1 - distance / reach is the overlap. For
+/// two spheres of contact distance d the distance is r / 2, and the reach d / 2 where they touch.
 ///
 /// Where two faces are in contact, the scale hardly depends on the point of tangency, and where two
 /// tips are, hardly on the normal: a small gap between the bounds of the scale does not bound the
@@ -70,8 +70,7 @@ template <int D, class S> class SuperellipsoidContact {
   using Body = SuperellipsoidBody<D, S>;
 
   SuperellipsoidContact(const Body &body_i, const Body &body_j, const SuperellipsoidLaw &of) :
-      i(body_i), j(body_j), r(body_i.centre - body_j.centre), law{of.epsilon},
-      shortcuts(of.shortcuts)
+      i(body_i), j(body_j), r(body_i.centre - body_j.centre), law(of.bond), shortcuts(of.shortcuts)
   {
   }
 
@@ -83,7 +82,7 @@ template <int D, class S> class SuperellipsoidContact {
  private:
   const Body &i, &j;
   Vec<D, S> r;
-  Harmonic law;
+  PowerLaw law;
   bool shortcuts;
 
   static constexpr bool IS_PLAIN = sizeof(S) == sizeof(T);  // no derivatives
@@ -195,8 +194,7 @@ struct SuperellipsoidModel {
   static constexpr bool BONDS_ARE_CONTACTS = false;
   static constexpr int OVERLAP_POWER = 2;
 
-  static Law law(double epsilon, Sides, bool shortcuts = true) { return {epsilon, shortcuts}; }
-  static double k_e(const Law &law) { return law.epsilon; }
+  static Law law(const PowerLaw &bond, Sides, bool shortcuts = true) { return {bond, shortcuts}; }
 
   using Form = SuperellipsoidForm;
   static constexpr const char *FORM = "p";

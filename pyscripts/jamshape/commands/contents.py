@@ -130,7 +130,7 @@ def _of_packing(packing: PackingLike) -> dict[str, Any]:
         parameters, size = packing.shape.parameters_of(*row)
         rows.append({**parameters, "size": size, "count": int(own.sum())})
     found = {"shape": packing.shape_style, "dimension": packing.dimension, "n": packing.n}
-    found |= packing.law._asdict()
+    found |= packing.law.stated()
     found |= {"kinds": rows, "unit": packing.shape.unit, "box": packing.box.edges.tolist()}
     found |= {"tilt": packing.box.tilt.tolist()} if packing.box.is_tilted else {}
     return found | ({"step": packing.step, "time": packing.time} if packing.step else {})

@@ -175,7 +175,7 @@ def _of_today(attributes: Mapping[str, Any], first: Packing) -> dict[str, Any]:
         return known
     if kind == "slow compression" and "gdot" in known:
         kind = "slow shear"
-    usual = {"finished": False, "dimension": first.dimension, **first.law._asdict()}
+    usual = {"finished": False, "dimension": first.dimension, **first.law.stated()}
     return usual | known | {KIND: kind}
 
 
@@ -218,7 +218,7 @@ def _of_modes(attributes: Mapping[str, Any]) -> dict[str, Any]:
     )
     if shape := packing.get("shape") or _shape_with(packing):
         packing["shape"] = shape
-    packing = Interaction.told(packing)._asdict() | packing
+    packing = Interaction.told(packing).stated() | packing
     parts = (f"{name}_modulus_{part}" for name in MODULI for part in (*PARTS, "bound"))
     usual = dict.fromkeys(parts, np.inf) | dict.fromkeys(COUNTS, 0)
     return usual | own | {f"{PREFIX}{name}": value for name, value in packing.items()}

@@ -17,12 +17,12 @@ from jamshape.command import parser_of, report
 from jamshape.commands.contents import contents_of
 from jamshape.files.meaning import Wanted
 from jamshape.shapes.command_line import add_meaning_options
-from jamshape.shapes.shape import stiffness_text
+from jamshape.shapes.shape import law_text, stiffness_text
 
 # Lines of the output; each part is printed if its number is known.
 _LINES = {
     "particles": ("{n} {shape}s in {dimension}D", "{kinds_text}"),
-    "contacts": ("k_e {k_e_text}",),
+    "contacts": ("law {law_text}", "k_e {k_e_text}"),
     "box": ("{box_text}", "tilt {tilt_text}"),
     "state": (
         "phi {phi:.8g}",
@@ -105,6 +105,8 @@ def lines_of(found: Mapping[str, Any]) -> Iterator[str]:
     }
     if found.get("k_e", 1.0) != 1.0:
         known["k_e_text"] = stiffness_text(found["k_e"])
+    if "power" in found:
+        known["law_text"] = law_text(found["power"])
     if found.get("kinds"):
         known["kinds_text"] = "; ".join(_kind(kind, found["unit"]) for kind in found["kinds"])
     if "bands" in found:

@@ -4,7 +4,7 @@
     jamshape minimise mine.data --shape spherocylinder --strict --out minimum.h5
 
 PACKING is any file with particles: H5MD, a LAMMPS dump or data file, GSD; the last frame, or that of --frame. Its law of
-contacts (k_e, sides, exponents) is kept. The last line of standard output is one JSON object; the exit code is 0 only
+contacts (k_e, sides, power, exponents) is kept. The last line of standard output is one JSON object; the exit code is 0 only
 if forces balance to --tolerance, which includes that none are left (unjammed). The same command resumes, with the file
 beside the result.
 """

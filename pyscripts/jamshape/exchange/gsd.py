@@ -163,7 +163,7 @@ def _frame(hoomd: Any, packing: Packing, form: Form) -> Any:
     exact |= {LOG + name: x for name, x in of_box.items()}
     exact[LOG + "time"] = np.array([packing.time])
     exact[LOG + "format_version"] = np.array([FORMAT_VERSION])
-    exact[LOG + "law"] = np.array([*np.ravel(packing.law.k_e), packing.law.sides])
+    exact[LOG + "law"] = np.hstack([np.ravel(x) for x in packing.law.stated().values()])
     # As numbers: OVITO before 3.17 fails on texts.
     exact[LOG + "shape_style"] = np.frombuffer(packing.shape_style.encode(), np.uint8)
     frame.log = exact
@@ -252,10 +252,11 @@ def _packing(path: PathLike, hoomd: Any, frame: Any) -> Packing:
         require_format(path, int(found.pop("format_version", [2])[0]), "0.1.0")
         columns = [name for name in found if name.startswith(_COLUMNS)]
         found["columns"] = {name.removeprefix(_COLUMNS): found.pop(name) for name in columns}
-        *numbers, sides = found["law"].tolist()
-        n = math.isqrt(len(numbers))
+        n = math.isqrt(len(found["law"]) - 1)
+        numbers, others = np.split(found["law"], [n * n])
         k_e = np.reshape(numbers, (n, n)) if n > 1 else numbers[0]
-        found["law"] = Interaction.told({"k_e": k_e, "sides": sides})
+        told = dict(zip(Interaction._fields[1:], others.tolist(), strict=False))
+        found["law"] = Interaction.told({"k_e": k_e, **told})
         packing = packing_of(found, style, int(frame.configuration.step), time)
         return as_edited(packing, _frame(hoomd, packing, Form.of(packing)), frame)
     except (KeyError, TypeError) as error:

@@ -102,7 +102,7 @@ def to_ovito(packing: Packing, rattlers: BoolArray | None = None) -> Any:
             particles.create_property(title, data=values)
     data.attributes["Timestep"], data.attributes["Time"] = packing.step, packing.time
     data.attributes[_PREFIX + "shape style"] = packing.shape_style
-    for name, value in packing.law._asdict().items():
+    for name, value in packing.law.stated().items():
         data.attributes[_PREFIX + name] = stiffness_text(value) if np.ndim(value) else value
     for field, titles in _rests_of_box(packing.dimension).items():
         for title, rest in zip(titles, getattr(packing, field).tolist(), strict=True):
@@ -155,7 +155,9 @@ def from_ovito(data: Any) -> Packing:
         for name in ("position", "orientation", "edges", "tilt"):
             if f"{name}_rest" in fields:
                 fields[f"{name}_rest"] = as_rest(fields[f"{name}_rest"], fields[name])
-        law = {name: known[_PREFIX + name] for name in Interaction._fields}
+        law = {
+            name: known[_PREFIX + name] for name in Interaction._fields if _PREFIX + name in known
+        }
         if isinstance(law["k_e"], str):  # a table
             law["k_e"] = stiffness_told(law["k_e"])
         fields["law"] = Interaction.told(law)

@@ -3,7 +3,7 @@ r"""Packings and runs as H5MD 1.1 files; a packing is a run with one frame.
 ::
 
     /h5md               +version [1, 1]   author/+name   creator/+name, version, format_version, origin (platform that determines the last bits: `jamshape.files.origin`)
-    /particles/all      +shape_style   +k_e, sides: the law of the contacts (1 and 2 if missing)
+    /particles/all      +shape_style   +k_e, sides, power: the law of the contacts (1, 2 and 2 if missing)
         box             +dimension D   +boundary D times "periodic"
             edges       {step, time, value (T, D), or (T, D, D) with the edge vectors as rows: for all
                         frames of a file that has a tilted box, the transposes of `Box.matrix`}

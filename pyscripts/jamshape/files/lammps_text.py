@@ -49,7 +49,7 @@ from jamshape.files.signature import DUMP, GSD, HDF5, REFUSED, format_of
 from jamshape.files.unpacked import opened_plain
 from jamshape.packing import Box, Lengths, Packing, angle_from_quaternion, cuboid_around
 from jamshape.packing.columns import flat, joined
-from jamshape.shapes.shape import Stiffness, stiffness_of, stiffness_text, stiffness_told
+from jamshape.shapes.shape import Stiffness, power_of, stiffness_of, stiffness_text, stiffness_told
 from jamshape.shapes.table import SHAPES
 
 _TITLE = "LAMMPS data file by jamshape"
@@ -382,7 +382,7 @@ def _header_text(packing: Packing) -> str:
     if packing.box.is_tilted:
         tilt = [*packing.box.tilt.tolist(), 0.0, 0.0][:3]
         sides.append(" ".join(f"{x:.17g}" for x in tilt) + " xy xz yz")
-    told = {"shape": packing.shape_style, "dimension": packing.dimension, **packing.law._asdict()}
+    told = {"shape": packing.shape_style, "dimension": packing.dimension, **packing.law.stated()}
     told["k_e"] = stiffness_text(packing.law.k_e)
     title = f"{_TITLE} # " + " ".join(f"{name}={value}" for name, value in told.items())
     return "\n".join([title, "", *counts, "", *sides, ""])
@@ -463,8 +463,7 @@ def packing_of_columns(
     shape = style.partition("/")[0]
     if shape in SHAPES:
         said = _of_pairs(shape, [row.split() for row in rows], 2, columns)
-        sides = {"sides": 1 if style.endswith("sides one") else 2}
-        said = replace(said, law={**said.law, **sides})
+        said = replace(said, law={**said.law, **_of_settings(style)})
     (bounds, tilt), boundary = box
     return _packing(name, _Frame(columns, bounds, tilt, said, boundary=boundary), wanted)
 
@@ -686,7 +685,7 @@ def _said(text: str, sections: Mapping[str, _Section], columns: dict[str, FloatA
     first = text.partition("\n")[0]
     if first.startswith(_TITLE) and "#" in first:
         words = dict(word.split("=", 1) for word in first.split("#")[1].split() if "=" in word)
-        law: dict[str, Any] = {"sides": float(words["sides"])} if "sides" in words else {}
+        law: dict[str, Any] = {k: float(words[k]) for k in ("sides", "power") if k in words}
         law |= {"k_e": stiffness_told(words["k_e"])} if "k_e" in words else {}
         rows = sections["PairIJ Coeffs"].rows if "PairIJ Coeffs" in sections else []
         if not all(_is_of(law.get("k_e", 1.0), row.split()) for row in rows):
@@ -714,6 +713,13 @@ def _of_pairs(
         forms = {kind: [float(x) for x in row[n_types + 1 :]] for kind, row in own.items()}
         columns |= _form_rows(forms, columns["type"])
     return Said(shape=shape, law={"k_e": k_e})
+
+
+def _of_settings(style: str) -> dict[str, Any]:
+    """Read the constants of contacts among the settings of a pair style of ours, ``sides one law power 3``."""
+    own, _, law = style.partition(" law ")
+    sides = {"sides": 1 if own.endswith("sides one") else 2}
+    return sides | ({"power": power_of(law)} if law else {})
 
 
 def _is_of(k_e: Stiffness, row: Sequence[str]) -> bool:

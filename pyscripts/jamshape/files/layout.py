@@ -176,7 +176,7 @@ def write_metadata(file: h5py.File) -> None:
 def write_particles(group: h5py.Group, frames: Sequence[Packing]) -> None:
     """Write frames of the same particles into an empty group."""
     first = frames[0]
-    set_attributes(group, {"shape_style": first.shape_style, **first.law._asdict()})
+    set_attributes(group, {"shape_style": first.shape_style, **first.law.stated()})
     # Half lengths and radii reproduce overlaps without the rounding of 2(A + R).
     more = first.shape.stored
     for name in ("species", "id", "diameters", *more):
@@ -230,7 +230,7 @@ def _read_law(file: h5py.File) -> Interaction:
     try:
         return Interaction.told(known)
     except (TypeError, ValueError) as error:
-        msg = f"{file.filename}: k_e and sides are not numbers ({error}), expected those of the contacts"
+        msg = f"{file.filename}: k_e, sides and power are not those of contacts ({error}), expected numbers"
         raise FileFormatError(msg) from error
 
 

@@ -45,7 +45,7 @@ class Said:
     dimension: int | None = None
     shape: str = ""
     law: Mapping[str, Any] = field(default_factory=dict)
-    """k_e and sides, if stated."""
+    """k_e, sides and power, if stated."""
     has_exponent: bool = False
     """Whether the file has exponents."""
     form: FloatArray = field(default_factory=lambda: np.empty((0, 0)))

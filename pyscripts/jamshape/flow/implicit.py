@@ -627,17 +627,20 @@ class ImplicitFlow:
     def _unit(self, evaluation: Evaluation) -> float:
         """Typical overlap, at least that caused by drag on a particle a diameter from the centre."""
         least = self._rate * self._least_drag * self.size
-        return max(evaluation.bond_force, least) * self.size**2 / self.landscape.stiffness
+        harmonic = max(evaluation.bond_force, least) * self.size**2 / self.landscape.stiffness
+        return harmonic * self.landscape.law.overlap_over_harmonic(harmonic / self.size)
 
     def _rms(self, vector: FloatArray) -> float:
         """Root mean square over particles of a vector of coordinates."""
         return float(np.linalg.norm(vector)) / math.sqrt(self.landscape.particles.n)
 
     def _units(self, evaluation: Evaluation) -> Units:
-        overlap = self._unit(evaluation)
+        overlap, power = self._unit(evaluation), self.landscape.law.power
         bonds = max(evaluation.n_bonds, self.landscape.particles.n)
-        energy = bonds * self.landscape.stiffness * (overlap / self.size) ** 2
-        force = self.landscape.stiffness * overlap / self.size**2
+        energy = bonds * self.landscape.stiffness * (overlap / self.size) ** power
+        force = (
+            self.landscape.stiffness * overlap / self.size**2 * (overlap / self.size) ** (power - 2)
+        )
         return Units(force, energy, math.sqrt(overlap * self.size), self.landscape.particles.n)
 
     def _is_extended(self, unit: float) -> bool:

@@ -128,7 +128,7 @@ class ImplicitDriver:
 
     def results(self) -> dict[str, Any]:
         """Return the law, times of a box that yields, and the cost so far."""
-        found = self._first.law._asdict() | (self._run.box.times if self._run.box else {})
+        found = self._first.law.stated() | (self._run.box.times if self._run.box else {})
         return found | {f"flow_{name}": getattr(self._flow, name) for name in _COST}
 
     def close(self) -> None:

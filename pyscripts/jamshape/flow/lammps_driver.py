@@ -14,7 +14,6 @@ from jamshape.flow.motion import FlowRun, Motion
 from jamshape.flow.shear import Shearing
 from jamshape.lammps.session import Session
 from jamshape.recording.driver import Plan, Row, Told
-from jamshape.shapes.shape import Interaction
 
 if TYPE_CHECKING:
     from jamshape.packing import Packing
@@ -51,8 +50,9 @@ def plan(
     driver = kind or LammpsDriver
 
     def begin() -> LammpsDriver:
-        law = Interaction(settings.k_e, settings.sides)
-        first = start().sorted_by_id().with_(law=law, step=0, time=0.0)
+        own = start().sorted_by_id()
+        law = own.law.but(settings.k_e, settings.sides)
+        first = own.with_(law=law, step=0, time=0.0)
         settings.all_steps(first)  # refuses what does not end
         if isinstance(settings, Shearing) and (said := settings.warning(first)):
             warnings.warn(said, stacklevel=2)
@@ -153,10 +153,11 @@ class LammpsDriver:
         return self._kept
 
     def results(self) -> dict[str, Any]:
-        """Return what LAMMPS left out, its version, and times of a box that yields."""
+        """Return what LAMMPS left out, its version, the power of a law that is not harmonic, and times of a box that yields."""
         session = self._session
         own = {"left_out": session.left_out(), "lammps_version": session.version}
-        return own | self._run.times()
+        law = {k: v for k, v in self._first.law.stated().items() if k == "power"}
+        return own | law | self._run.times()
 
     def close(self) -> None:
         """End LAMMPS."""

@@ -14,7 +14,7 @@ from jamshape.checks import require_one_of, require_positive
 from jamshape.files.checkpoint import Checkpoint
 from jamshape.lammps.module import one_at_a_time
 from jamshape.packing import Packing
-from jamshape.shapes.shape import Interaction, Stiffness, stiffness_of
+from jamshape.shapes.shape import Stiffness, stiffness_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -201,13 +201,13 @@ class FlowRun(Generic[_Motion]):
             self._time, self._step_of_time = checkpoint["time"], checkpoint["step_of_time"]
             self._evaluations = checkpoint["evaluations"]
             session.load_restart(checkpoint["restart"], start)
-        self._set_up()
+        self._set_up(start)
         found = self.measure() | {"step": session.step}
         self.last_step = session.step + settings.steps_left(found, start.dimension)
 
-    def _set_up(self) -> None:
+    def _set_up(self, start: Packing) -> None:
         s = self.settings
-        self.session.interact(Interaction(s.k_e, s.sides))
+        self.session.interact(start.law.but(s.k_e, s.sides))
         # A box from a restart file tilts if it did.
         tilt = "change_box all triclinic" if s.tilts and not self.session.is_tilted else ""
         self.session.commands(f"""

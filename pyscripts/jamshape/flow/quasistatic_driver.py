@@ -118,7 +118,7 @@ class QuasistaticDriver:
 
     def results(self) -> dict[str, Any]:
         """Return the law, and counts so far."""
-        found = self._first.law._asdict()
+        found = self._first.law.stated()
         return found | {f"shear_{name}": getattr(self._run, name) for name in _COUNTS}
 
     def close(self) -> None:

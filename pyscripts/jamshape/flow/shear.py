@@ -123,8 +123,8 @@ class Shearing(Motion):
     def drag_over_force(self, packing: Packing) -> float:
         """Estimate the drag on a particle held by others, over the strength of one contact.
 
-        The drag is that at the host's velocity at its outer radius; a harmonic contact bears its
-        stiffness, the smallest of a table, over the distance of first touch.
+        The drag is that at the host's velocity at its outer radius; a contact bears its stiffness, the smallest
+        of a table, over the distance of first touch.
         """
         pull = self.k_d * packing.measures * self.gdot * packing.outer_radius
         return float((2 * pull * packing.inner_radius).max() / np.min(self.k_e))

@@ -160,7 +160,7 @@ def compress(
         require_no_effect("integrator", integrator, integration_tolerance=integration_tolerance)
     settings.steps(phi[0], dimension)  # refuses what does not end
     at = place(file, "run.h5")
-    made_from = dict(particles.told) | {"n": n, "phi_start": phi[0], "seed": seed}
+    made_from = particles.identity | {"n": n, "phi_start": phi[0], "seed": seed}
     plan = lammps_driver.plan(
         lambda: random_packing(n, phi[0], seed, particles, dimension),
         settings, Sizes(rows, frames), made_from | {"dimension": dimension},

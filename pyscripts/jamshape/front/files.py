@@ -46,7 +46,7 @@ def load(
         Dimension, for a dump or data file that does not state it; guessed by default, with a warning.
     shape : str, optional
         Likewise the shape: ``"spherocylinder"``, ``"superellipsoid"`` or ``"dimer"``. The default law is assumed
-        for such a file; use ``packing.with_(law=js.Interaction(k_e, sides))`` for another one.
+        for such a file; use ``packing.with_(law=js.Interaction(k_e, sides, power))`` for another one.
 
     Returns
     -------

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from jamshape.arguments import checked
-from jamshape.checks import RANGES, ArgumentError, require_in, require_no_effect, require_stated
+from jamshape.checks import ArgumentError, require_in, require_no_effect, require_stated
 from jamshape.front.progress import place
 from jamshape.front.reading import Held
 from jamshape.front.recorded import recorded
@@ -84,9 +84,9 @@ def ladder(
     if len(values) > _MOST:
         said = f"{{{name}:name}} has {len(values)} values, expected at most {_MOST}; divide them over several runs"
         raise ArgumentError(said, {name: values})
-    for value in values:
-        require_in(name, value, RANGES[name]._replace(also=()))
     start = start_of(packing)
+    for value in values:
+        require_in(name, value, start.law.range_of(name)._replace(also=()))
     how = Ladder(name, tuple(values), accuracy, tolerance, box)
     how.require_reachable(Landscape(start))
     at = place(file, "ladder.h5")

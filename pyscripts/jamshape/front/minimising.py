@@ -16,6 +16,7 @@ from jamshape.minima.target import FixedBox, Target
 from jamshape.protocols.defaults import aim_of
 from jamshape.protocols.recipe import Aim, Given, Recipe
 from jamshape.shapes.particles import Particles
+from jamshape.shapes.shape import Interaction
 
 _EVALUATIONS = 200_000
 
@@ -104,7 +105,7 @@ def minimise(
     targets = {"u0": u0, "pressure": pressure, "phi": phi}
     box = FREE if stable_to_shear and box is None else box
     if box not in {None, FIXED} or any(value is not None for value in targets.values()):
-        goal = _aim(targets, box, accuracy, tolerance)
+        goal = _aim(targets, box, accuracy, tolerance, state.law)
         named = next(name for name, value in targets.items() if value is not None)
         require_no_effect(named, targets[named], minimiser=minimiser, evaluations=evaluations)
     elif accuracy is not None:
@@ -116,13 +117,18 @@ def minimise(
 
 
 def _aim(
-    targets: Mapping[str, float | None], box: str | None, accuracy: float | None, tolerance: float
+    targets: Mapping[str, float | None],
+    box: str | None,
+    accuracy: float | None,
+    tolerance: float,
+    law: Interaction,
 ) -> Aim:
     """Return the target, with the box that yields to it."""
     u0 = targets["u0"]
     if u0 is not None:
-        require_in("u0", u0, RANGES["u0"]._replace(also=()))
-    get, given = {"u0": u0, "tolerance": tolerance}, {"u0": u0, "accuracy": accuracy}
+        require_in("u0", u0, law.range_of("u0")._replace(also=()))
+    get = {"u0": u0, "tolerance": tolerance, "power": law.power}
+    given = {"u0": u0, "accuracy": accuracy}
     aim = aim_of(get, given, pressure=targets["pressure"], phi=targets["phi"], box=box)
     if aim is not None:
         return aim

@@ -116,6 +116,7 @@ class Packing(PackingLike):
         image: ArrayLike | None = None,
         k_e: ArrayLike | None = None,
         sides: int | None = None,
+        law: str | float | None = None,
         **parameters: ArrayLike,
     ) -> Self:
         """Make a packing from plain arrays, of a simulation or an experiment.
@@ -146,6 +147,8 @@ class Packing(PackingLike):
             Stiffness of the contacts; 1 by default. A symmetric table has one for each pair of species, as ``pair_coeff I J``.
         sides : {1, 2}, optional
             Bonds of a side-to-side contact; 2 by default.
+        law : str or float, optional
+            ``"harmonic"`` (default), ``"hertz"``, or the power of the overlap in the energy of a contact, at least 2.
         **parameters : float or (N,) array_like
             All parameters of the shape, as its constructor has them: ``alpha`` of rods and dimers; ``p``, ``w1``,
             ``w2`` of superellipsoids, whose axes x, y, z are a, b, c with a/b = w1 <= 1 and c/b = w2 >= 1.
@@ -199,7 +202,7 @@ class Packing(PackingLike):
             box=cell,
             image=np.empty(0) if image is None else image,  # type: ignore[arg-type]
             shape_style=shape,
-            law=Interaction().but(k_e, sides),
+            law=Interaction().but(k_e, sides, law),
         )
         if orientation is None and not packing.is_round.all():
             what = f"({n},) angles" if cell.dimension == 2 else f"({n}, 4) quaternions"

@@ -16,7 +16,6 @@ import numpy as np
 from jamshape.arguments import checked
 from jamshape.arrays import BoolArray, FloatArray, IntArray
 from jamshape.checks import (
-    RANGES,
     NotReachedWarning,
     Range,
     require_in,
@@ -56,13 +55,11 @@ from jamshape.measures.steady import SteadyState, steady_state
 from jamshape.packing import Packing as PackingLike
 from jamshape.protocols.ladder import Ladder, bring
 from jamshape.recording.driver import Told
+from jamshape.shapes.shape import Interaction
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-
-# Forces below this mean bond force have nothing to balance.
-_NO_ENERGY = RANGES["u0"].low
 
 _WITHIN = Range(1e-12, 1.0, "a relative distance")
 _PART_OF_WITHIN = 0.1  # accuracy of states that enclose a change
@@ -211,7 +208,7 @@ class RunFile(Recorded):
             `jamshape.measures.onset.fit_onset`.
         """
         try:
-            return fit_onset(self.phi, self.pressure)
+            return fit_onset(self.phi, self.pressure, power=Interaction.told(self.about).power)
         except ValueError:  # it ends below jamming
             return None
 
@@ -545,7 +542,8 @@ class QuasistaticShearFile(Recorded):
         """(T,) whether forces balance to the tolerance, or vanish, in each row; of an unfinished run, rows so far."""
         residual, u = read_report(self.file).error, self["u"]
         n = min(len(residual), len(u))
-        return np.asarray((residual[:n] <= self.about["tolerance"]) | (u[:n] <= _NO_ENERGY))
+        least = Interaction.told(self.about).range_of("u0").low  # no force left to balance
+        return np.asarray((residual[:n] <= self.about["tolerance"]) | (u[:n] <= least))
 
     def warn_unless_reached(self) -> None:
         """Warn if a minimisation after a step did not balance forces."""

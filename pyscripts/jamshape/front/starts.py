@@ -16,7 +16,7 @@ from jamshape.front.reading import Held, packing_of
 from jamshape.packing import Packing as PackingLike
 from jamshape.protocols.random_start import random_packing, start_below
 from jamshape.shapes.particles import Particles
-from jamshape.shapes.shape import Interaction, Stiffness, stiffness_text
+from jamshape.shapes.shape import Interaction, Stiffness, law_text, stiffness_text
 
 
 def start_of(start: Held, sides: int = 2) -> Packing:
@@ -49,7 +49,7 @@ def require_known_kinks(sides: int, dimension: int) -> None:
 def told_of(start: Packing) -> dict[str, Any]:
     """Return metadata on the particles of a start and on its source."""
     own = [parameter.name for parameter in start.shape.parameters]
-    names, results = (*own, "size_ratio", "kinds", "seed"), start.results
+    names, results = (*own, "size_ratio", "kinds", "law", "seed"), start.results
     found = {name: results[name] for name in names if name in results}
     # As UTF-8, whatever the locale: names may hold bytes that it cannot decode.
     name = os.fsencode(named(start.file)).decode(errors="replace") if start.file else digest(start)
@@ -63,10 +63,12 @@ def told_of(start: Packing) -> dict[str, Any]:
 
 
 def digest(start: PackingLike) -> str:
-    """Name a packing without a file by its poses, and k_e other than 1, to distinguish it from another one."""
+    """Name a packing without a file by its poses, and k_e other than 1 and laws other than harmonic, to distinguish it from another one."""
     poses = b"".join(np.ascontiguousarray(x, np.float64).tobytes() for x in start.poses())
     if start.law.k_e != Interaction().k_e:
         poses += stiffness_text(start.law.k_e).encode()
+    if start.law.power != Interaction().power:
+        poses += law_text(start.law.power).encode()
     return f"packing {hashlib.blake2b(poses, digest_size=8).hexdigest()}"
 
 
@@ -128,7 +130,7 @@ class Start(NamedTuple):
             return told_of(self.known)
         assert self.particles
         own = {"n": self.n, self.phi_name: self.phi, "seed": self.seed}
-        return dict(self.particles.told) | own
+        return self.particles.identity | own
 
     def random(self, phi: float | None = None) -> PackingLike:
         """Make the random start at a packing fraction; by default the one asked for, or the densest possible."""

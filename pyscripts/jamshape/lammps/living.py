@@ -36,7 +36,7 @@ class Living(Protocol):
 def read_living(living: Living, wanted: Wanted) -> Packing:
     """Read the present state of a LAMMPS instance, in the order of its IDs.
 
-    Shape, k_e, sides and exponents are those of its pair style, if it is one of ours; otherwise they are guessed as for
+    Shape, k_e, sides, law and exponents are those of its pair style, if it is one of ours; otherwise they are guessed as for
     files, with a warning.
 
     Parameters

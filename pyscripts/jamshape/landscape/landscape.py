@@ -73,6 +73,7 @@ class Landscape:
     ) -> None:
         law = packing.law.but(k_e, sides)
         self.particles, self.k_e, self.sides = packing, law.k_e, law.sides
+        self.law = law
         self.bodies = packing.compiled(law)
         self.evaluations = 0
         self._pairs: Pairs | None = None
@@ -85,6 +86,13 @@ class Landscape:
     def stiffness(self) -> float:
         """The unit of energy: k_e, the largest one of a table."""
         return float(np.max(self.k_e))
+
+    def stiffness_at(self, bond_force: float) -> float:
+        """Return the stiffness of a bond with a force, times the square of `length`: k_e if it is harmonic."""
+        slope, power = bond_force * self.length / self.stiffness, self.law.power
+        overlap = slope * self.law.overlap_over_harmonic(slope)
+        softer: float = (power - 1) * overlap ** (power - 2)
+        return softer * self.stiffness
 
     @cached_property
     def rotation_length(self) -> FloatArray:

@@ -175,6 +175,7 @@ def stays_jammed(packing: Packing, k_e: ArrayLike | None = None) -> bool | None:
     """
     landscape, state = Landscape(packing, k_e, sides=2), State.of(packing)
     lowest = _LOWEST * landscape.stiffness / landscape.length**packing.dimension
+    lowest *= landscape.law.over_harmonic(_LOWEST)
     stop = Stop(tolerance=_TOLERANCE, lowest=lowest, evaluations=_EVALUATIONS)
     try:
         found = minimise(landscape, state, "auto", stop)

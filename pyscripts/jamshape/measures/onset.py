@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jamshape.arrays import FloatArray
+from jamshape.shapes.shape import HARMONIC
 
 # Pressures up to this fraction of the largest count as zero.
 _FLOOR = 1e-4
@@ -53,23 +54,22 @@ class OnsetFit(NamedTuple):
     last: int
 
 
-def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) -> OnsetFit:
+def fit_onset(
+    phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None, power: float = HARMONIC
+) -> OnsetFit:
     """Fit a line to the pressure just above the onset of jamming and extrapolate it to zero.
 
-    Marschall & Teitel 2018, Fig. 4, find by eye "the part of the p vs phi curve where the pressure
-    first develops a linear behavior upon increasing phi, before there occurs any plastic
-    rearrangements". Here:
+    Marschall & Teitel 2018, Fig. 4, find by eye "the part of the p vs phi curve where the pressure first develops a linear
+    behavior upon increasing phi, before there occurs any plastic rearrangements". Here:
 
-    1. The curve after its last row without pressure is split into parts at drops of the pressure.
-    Parts that later lose more than half of their pressure are discarded: they were not the onset.
-    2. Lines are fitted between all pairs of ends within each part. A line is valid if it rises out
-    of the noise, if a quadratic term hardly moves its zero, and if the curve is not much steeper
-    soon after. The last two exclude the rounded foot due to a finite
-    compression rate.
-    3. In the first part with valid lines, the one with the smallest error is chosen, or the
-    lowest of those nearly as good. Its error includes the choice of the window: the root mean square
-    deviation of phi_J over the others, of all parts, that begin below ten times the pressure where it ends,
-    each weighted with its number of rows, valid or not.
+    1. The curve after its last row without pressure is split into parts at drops of the pressure. Parts that later lose
+    more than half of their pressure are discarded: they were not the onset.
+    2. Lines are fitted between all pairs of ends within each part. A line is valid if it rises out of the noise, if a
+    quadratic term hardly moves its zero, and if the curve is not much steeper soon after. The last two exclude the
+    rounded foot due to a finite compression rate.
+    3. In the first part with valid lines, the one with the smallest error is chosen, or the lowest of those nearly as
+    good. Its error includes the choice of the window: the root mean square deviation of phi_J over the others, of all
+    parts, that begin below ten times the pressure where it ends, each weighted with its number of rows, valid or not.
 
     Parameters
     ----------
@@ -79,14 +79,15 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
     p_error : (T,) array_like, optional
         Standard errors, such as those of a mean over samples. Only their ratios matter, as weights;
         the scatter about the line gives the error of the fit.
+    power : float
+        A of the law of contacts: p^(1 / (A - 1)), linear in phi, is fitted instead of p.
 
     Returns
     -------
     OnsetFit
-        phi_J(kappa), at the rate of this compression: it rises as kappa falls, until kappa is about
-        1e-9. `jamshape.measures.jamming` finds whether states there stay jammed. The error covers neither that nor
-        differences between samples, which are larger, nor stretches with fewer rows than a line needs: if sampling of
-        p is so sparse that it misses the first, phi_J is that of a later one.
+        phi_J(kappa), at the rate of this compression: it rises as kappa falls, until kappa is about 1e-9. The error covers
+        neither whether states there stay jammed (`jamshape.measures.jamming`) nor differences between samples, which are
+        larger, nor rows so sparse that a line misses the first stretch.
 
     Raises
     ------
@@ -94,6 +95,7 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
         If the data have no onset, no linear part above it, or an argument is out of its range.
     """
     x, y, weight = _checked(phi, p, p_error)
+    y = np.copysign(np.abs(y) ** (1 / (power - 1)), y)
     scale = float(np.abs(y).max()) or 1.0
     y = y / scale
     parts, min_rise = _lasting_rises(y)

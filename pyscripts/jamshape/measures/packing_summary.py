@@ -19,6 +19,7 @@ from jamshape.measures.contact_statistics import contact_scale, residuals
 from jamshape.measures.order import order
 from jamshape.minima import History, Minimum, residual_of, rounding_floor
 from jamshape.packing import Packing
+from jamshape.shapes.shape import HARMONIC
 
 # Rows of the convergence history stored in a packing's file.
 _REPORT_ROWS = 2000
@@ -92,7 +93,7 @@ def measure(landscape: Landscape, minimum: Minimum) -> Measured:
     attributes: dict[str, float | str] = {
         "outcome": minimum.outcome.value,
         "phi": packing.phi,
-        "phi_J": energy_onset(packing.phi, u, pressure),
+        "phi_J": energy_onset(packing.phi, u, pressure, packing.law.power),
         "u": u,
         "energy_per_particle": minimum.evaluation.energy / packing.n,
         "pressure": pressure,
@@ -135,12 +136,12 @@ def _net(landscape: Landscape, minimum: Minimum, found: Contacts) -> dict[str, F
     return {"net_force": net.force, "net_torque": net.torque}
 
 
-def energy_onset(phi: float, u: float, pressure: float) -> float:
-    """Extrapolate phi to where sqrt(u), linear in phi, vanishes: du/dphi = p / phi - u / phi at fixed particles.
+def energy_onset(phi: float, u: float, pressure: float, power: float = HARMONIC) -> float:
+    """Extrapolate phi to where r = u^(1/A), linear in phi, vanishes, A the power of the overlap in the energy of a contact.
 
-    u = U / V and dU/dV = -p; with V = const / phi, d sqrt(u)/dphi = (p + u) / (2 phi sqrt(u)).
+    u = U / V and dU/dV = -p; with V = const / phi at fixed particles, du/dphi = (p + u) / phi, and dr/dphi = r / (A u) of it.
     """
-    return phi - 2 * phi * u / (pressure + u) if u > 0 else math.nan
+    return phi - power * phi * u / (pressure + u) if u > 0 else math.nan
 
 
 def thinned(history: History) -> tuple[list[int], list[float], list[float]]:

@@ -13,6 +13,7 @@ from jamshape.files.ensembles import PackingFile, System
 from jamshape.files.h5md import read_attributes, read_observables
 from jamshape.measures.jamming import Jamming
 from jamshape.measures.onset import OnsetFit, fit_onset
+from jamshape.shapes.shape import Interaction
 
 # Observables whose last values a summary has; slow runs have no contact numbers and order.
 _LAST = ("phi", "pressure", "u", "z", "S_2", "S_4")
@@ -100,9 +101,14 @@ def read_run(path: Path) -> Run:
     run = Run(path, ensemble_of(file), seed, phi, pressure, None)
     run = run._replace(jamming=Jamming.stored(file.attributes))
     try:
-        return run._replace(fit=fit_onset(phi, pressure))
+        return run._replace(fit=fit_onset(phi, pressure, power=_power(file.attributes)))
     except ValueError as error:  # it ends below jamming, or rearranges too soon
         return run._replace(problem=f"{path}: {error}")
+
+
+def _power(stored: Mapping[str, Any]) -> float:
+    """Return the power of the law of contacts of a run."""
+    return Interaction.told(stored).power
 
 
 def summary_of(path: Path) -> dict[str, Any]:
@@ -123,7 +129,7 @@ def onset_report(path: Path) -> dict[str, Any]:
     found, stored = read_observables(path), read_attributes(path)
     names, kappa = ("phi_J(kappa)", "phi_J(kappa)_error"), rate_of(stored)
     try:
-        fit = fit_onset(found["phi"], found["pressure"])
+        fit = fit_onset(found["phi"], found["pressure"], power=_power(stored))
     except ValueError:  # it ends below jamming
         fit = None
     told = dict(zip(names, fit[:2] if fit else (None, None), strict=True)) | {"kappa": kappa}

@@ -16,14 +16,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jamshape.arrays import FloatArray, LongArray
-from jamshape.checks import ArgumentError, require_stated
+from jamshape.checks import ArgumentError, require_in, require_positive, require_stated
 from jamshape.contacts import CrossingError
 from jamshape.landscape import Landscape
 from jamshape.landscape.local_energy_model import LocalEnergyModel
 from jamshape.landscape.newton import least_shift
 from jamshape.minima.descent import History, Minimum, Outcome, Stop, rounding_floor
 from jamshape.minima.minimise import minimise
-from jamshape.minima.target import Target, TargetError, require_reachable, strain_at
+from jamshape.minima.target import (
+    Target,
+    TargetError,
+    fraction_of_energy,
+    require_reachable,
+    strain_at,
+)
 from jamshape.packing import State
 from jamshape.packing.box import COMPONENTS
 
@@ -39,7 +45,7 @@ _NEAR = (
     0.1  # relative distance of the stress to its target below which minima have the full tolerance
 )
 _ACCURACY = 1e-9  # of the linear response
-_SHIFT = 1e-13  # least shift of the Hessian, in k_e / length^2, so that translations do not take up rounding
+_SHIFT = 1e-13  # least shift of the Hessian, over the stiffness of a bond, so that translations do not take up rounding
 _FALLEN = 1e-2  # fraction of the expected energy below which the packing has come apart
 _LONGEST = 5e-3  # largest strain in a step
 _CLOSING = 1e-5  # first strain of an unjammed packing; doubled each time
@@ -150,7 +156,9 @@ class Yielding:
             found = " and ".join(given) or "none"
             msg = f"targets are {found}, expected one of pressure, u0 and phi"
             raise ValueError(msg)
-        require_stated(**given, accuracy=self.accuracy, tolerance=self.tolerance)
+        # Targets have ranges that depend on the law.
+        require_positive(**given)
+        require_stated(accuracy=self.accuracy, tolerance=self.tolerance)
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -174,6 +182,9 @@ class Yielding:
 
     def require(self, landscape: Landscape) -> None:
         """Refuse a box that the target cannot have, or a target out of reach; raises ValueError."""
+        for name in ("u0", "pressure"):
+            if (value := getattr(self, name)) is not None:
+                require_in(name, value, landscape.law.range_of(name))
         if self.u0 is not None:
             require_reachable(landscape, Target(self.u0))
         strains = strains_of(self.box, landscape.particles.dimension)
@@ -282,7 +293,9 @@ class _Posed(NamedTuple):
     """(k + 1, n) motion of the particles by each strain, and by their remaining forces."""
 
 
-def _pressures(tensor: FloatArray, at: Settling, goal: Yielding) -> tuple[float, float]:
+def _pressures(
+    landscape: Landscape, tensor: FloatArray, at: Settling, goal: Yielding
+) -> tuple[float, float]:
     """Return the mean pressure in the components that may change the volume, and the one to reach."""
     present, normal = at.present, strains_of(goal.box, len(tensor))[0]
     assert present is not None
@@ -293,7 +306,8 @@ def _pressures(tensor: FloatArray, at: Settling, goal: Yielding) -> tuple[float,
     if goal.pressure is not None:
         return pressure, max(goal.pressure, at.level)
     assert goal.u0 is not None
-    return pressure, max(pressure * math.sqrt(goal.u0 / present.energy_density), at.level)
+    root = landscape.law.root(goal.u0 / present.energy_density)
+    return pressure, max(pressure * root ** (landscape.law.power - 1), at.level)
 
 
 def advance(landscape: Landscape, at: Settling, goal: Yielding) -> None:
@@ -321,7 +335,7 @@ def advance(landscape: Landscape, at: Settling, goal: Yielding) -> None:
         if _changes_shape(goal, at.state):
             is_loose = at.present.outcome is Outcome.UNJAMMED
             tensor = landscape.stress(at.present.state)
-            present = math.inf if is_loose else _pressures(tensor, at, goal)[0]
+            present = math.inf if is_loose else _pressures(landscape, tensor, at, goal)[0]
             at.level = min(first_level(landscape), present) if at.first is None else at.first
     elif at.n_steps >= _MOST_STEPS:
         _give_up(at, goal)
@@ -351,7 +365,7 @@ def _judge(landscape: Landscape, at: Settling, goal: Yielding) -> None:
         at.done, at.stress_error = goal.keeps_volume, 0.0
         return
     tensor = landscape.stress(present.state)
-    aim = _pressures(tensor, at, goal)[1]
+    aim = _pressures(landscape, tensor, at, goal)[1]
     at.stress_error = _stress_error(tensor, aim, goal)
     if not goal.keeps_volume and at.level == aim:
         if at.stress_error < _SETTLED:
@@ -388,7 +402,8 @@ def _has_volume(landscape: Landscape, state: State, goal: Yielding) -> bool:
 
 def first_level(landscape: Landscape) -> float:
     """Return a pressure at which unstable boxes yield in few steps, [energy / length^D]."""
-    return _FIRST_LEVEL * landscape.stiffness / landscape.length**landscape.particles.dimension
+    level: float = _FIRST_LEVEL ** (landscape.law.power - 1) * landscape.stiffness
+    return level / landscape.length**landscape.particles.dimension
 
 
 def _changes_shape(goal: Yielding, state: State) -> bool:
@@ -398,7 +413,7 @@ def _changes_shape(goal: Yielding, state: State) -> bool:
 def _lift(landscape: Landscape, at: Settling, goal: Yielding) -> None:
     """Continue at a higher pressure where contacts open and close within the smallest steps."""
     assert at.present is not None
-    aim = _pressures(landscape.stress(at.present.state), at, goal)[1]
+    aim = _pressures(landscape, landscape.stress(at.present.state), at, goal)[1]
     level = max(at.level, aim) / _LOWER
     if (
         at.n_lifts == _MOST_LIFTS
@@ -498,7 +513,7 @@ def _trial(landscape: Landscape, at: Settling, goal: Yielding) -> _Trial:
     assert present is not None
     state = present.state
     tensor = landscape.stress(state)
-    pressure, aim = _pressures(tensor, at, goal)
+    pressure, aim = _pressures(landscape, tensor, at, goal)
     every = strains_of(goal.box, state.dimension)
     stress = goal.stress(aim, state.dimension)
     posed = _posed(landscape, present, every[int(goal.keeps_volume) :], (tensor, stress))
@@ -516,8 +531,10 @@ def _trial(landscape: Landscape, at: Settling, goal: Yielding) -> _Trial:
         floor = _FLOORS * rounding_floor(present.evaluation, landscape)
         is_sliding = at.tolerance > goal.tolerance
         tolerance = at.tolerance if is_sliding else min(goal.tolerance, max(_TIGHT, floor))
-    falls = min(1.0, (aim / pressure) ** 2) if pressure > 0 else 1.0
-    stop = Stop(tolerance, lowest=_FALLEN * falls * present.energy_density)
+    power = landscape.law.power
+    falls = min(1.0, (aim / pressure) ** (power / (power - 1))) if pressure > 0 else 1.0
+    least = fraction_of_energy(landscape, _FALLEN) * falls
+    stop = Stop(tolerance, lowest=least * present.energy_density)
     expected = float(posed.slope @ e + 0.5 * e @ posed.curvature @ e)
     return _Trial(moved, matrix, aim, expected, length / from_jamming, is_near, stop)
 
@@ -553,7 +570,7 @@ def _posed(
 ) -> _Posed:
     """Set up Newton's equations for strains, at the pressure tensors that are and are to be."""
     state, volume = present.state, present.state.volume
-    least = _SHIFT * landscape.stiffness / landscape.length**2
+    least = _SHIFT * landscape.stiffness_at(present.evaluation.bond_force) / landscape.length**2
     shift = max(least, least_shift(landscape, present.evaluation))
     newton = LocalEnergyModel(landscape, state).newton(shift)
     newton.prepare()

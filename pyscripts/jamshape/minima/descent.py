@@ -66,7 +66,7 @@ class Stop:
         Converged when the residual is smaller.
     lowest
         Unjammed when the energy density is smaller, [energy / length^D]; by default 1e-24 in units of
-        k_e and `Landscape.length`.
+        k_e and `Landscape.length`, for harmonic contacts; for others that of the same overlap.
     evaluations
         Exhausted after this number of evaluations of all forces.
     seconds
@@ -146,11 +146,13 @@ def residual_of(landscape: Landscape, evaluation: Evaluation) -> Residual:
 
 def rounding_floor(evaluation: Evaluation, landscape: Landscape, *, extended: bool = True) -> float:
     """Residual due to rounding of the coordinates alone: about eps / overlap."""
-    return rounding_of_a_bond(landscape, extended=extended) / max(evaluation.bond_force, 1e-300)
+    softer = landscape.stiffness_at(evaluation.bond_force) / landscape.stiffness
+    rounding = softer * rounding_of_a_bond(landscape, extended=extended)
+    return rounding / max(evaluation.bond_force, 1e-300)
 
 
 def rounding_of_a_bond(landscape: Landscape, *, extended: bool = True) -> float:
-    """Force error due to rounding of the coordinates, [energy / length]."""
+    """Force error due to rounding of the coordinates, [energy / length]; an upper bound unless contacts are harmonic."""
     eps = float(np.finfo(np.longdouble if extended else np.float64).eps)
     return 8 * eps * landscape.stiffness / float(landscape.inner_radius.max())
 
@@ -163,7 +165,8 @@ class Descent:
     ) -> None:
         self.landscape, self.stop = landscape, stop
         unit = landscape.stiffness / landscape.length**start.dimension
-        self.lowest = _LOWEST * unit if stop.lowest is None else stop.lowest
+        lowest = _LOWEST * unit * landscape.law.over_harmonic(_LOWEST)
+        self.lowest = lowest if stop.lowest is None else stop.lowest
         self.history = history or History()
         self.state = start
         self._first_evaluation, self._began = landscape.evaluations, time.perf_counter()

@@ -95,8 +95,15 @@ class Corner:
     @property
     def overlap(self) -> float:
         """Mean overlap of a bond, [length]."""
-        unit = self.landscape.length**2 / self.landscape.stiffness
-        return self.pieces[0].evaluation.bond_force * unit
+        force, unit = (
+            self.pieces[0].evaluation.bond_force,
+            self.landscape.length**2 / self.landscape.stiffness,
+        )
+        return (
+            force
+            * unit
+            * self.landscape.law.overlap_over_harmonic(force * unit / self.landscape.length)
+        )
 
     @property
     def near(self) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import collections
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -28,19 +27,20 @@ _SLIDING = 1e-5
 
 _MOST_MINIMA = 60  # on the way to u0
 _GAIN = 1.5  # relaxation of the tolerance after a stall that leaves only sliding
-_NEAR = 0.1  # relative distance of sqrt(u) to its target below which minima have the full tolerance
+_NEAR = 0.1  # relative distance of the root of u to its target below which minima have the full tolerance
 _TRIES = 2  # fractions of a strain to try where the whole one unjams the packing
-_SOFT = 1e-6  # stiffness, in k_e / length^2, below which modes count as sliding
+_SOFT = 1e-6  # stiffness, over that of a bond, below which modes count as sliding
 _CLOSE = 1e-3  # relative distance of u to u0 below which losses by minimising are compensated
 _CYCLES = 3  # approaches to u0 after stalls
 _HIGHER = 2.0  # energy over u0 from which they start again
 _STIFF_STEPS = 4  # Newton steps that relax stiff modes
 _ACCURACY = 1e-9  # of the solutions of Newton's equations
 
-# Largest factor in sqrt(u), which is linear in phi - phi_J, between two steps.
+# Largest factor in the root of u that is linear in phi - phi_J, sqrt(u) of harmonic contacts, between two steps.
 _LARGEST_FACTOR = 4.0
 
-# A minimisation whose energy falls below this fraction of its target is unjamming: the box was opened too far.
+# A minimisation whose energy falls below this fraction of its target is unjamming: the box was opened too far. All
+# fractions of energies are those of harmonic contacts; of other ones those of the same change of overlaps.
 _FALLEN = 1e-2
 
 # Likewise for this fraction of the energy that a compression step adds to a jammed packing.
@@ -161,7 +161,13 @@ Goal = Target | FixedBox
 
 def strain_at(landscape: Landscape, u: float) -> float:
     """Estimate the strain of the box between jamming and an energy density."""
-    return math.sqrt(u / _stiffness(landscape))
+    return landscape.law.overlap_of(u / _stiffness(landscape))
+
+
+def fraction_of_energy(landscape: Landscape, of_harmonic: float) -> float:
+    """Return the fraction to which an energy falls where that of harmonic contacts would fall to another one."""
+    fraction: float = of_harmonic ** (landscape.law.power / 2)
+    return fraction
 
 
 def _stiffness(landscape: Landscape) -> float:
@@ -207,8 +213,9 @@ class Search:
         """
         if self.opening is None:
             return None
-        least = _FALLEN * target.u0
+        least = fraction_of_energy(landscape, _FALLEN) * target.u0
         added = _UNJAMMED * _stiffness(landscape) * self.step**2
+        added *= landscape.law.over_harmonic(_UNJAMMED * self.step**2)
         return least if self.opening else max(least, added)
 
     def close_further(self, unjammed: State, fine: float, target: Target) -> None:
@@ -237,7 +244,8 @@ def extrapolation(landscape: Landscape, search: Search, target: Target) -> Itera
     """Find the packing by straining the box to where the energy is u0, and minimising.
 
     Unjammed states are compressed by small strains and minimised, until one stays jammed. From
-    there sqrt(u), which is linear in the strain, is extrapolated to sqrt(u0) minimum by minimum. A box opened
+    there the root of u that is linear in the strain, sqrt(u) of harmonic contacts, is extrapolated to that of u0 minimum by
+    minimum. A box opened
     too far is closed in finer steps.
 
     Parameters
@@ -324,7 +332,7 @@ def require_reachable(landscape: Landscape, target: Target) -> None:
 class Leading:
     """A minimum on its way to u0, between two minimisations, with all that is needed to resume it.
 
-    The box is strained to where sqrt(u), which is linear in the strain, reaches that of u0. Where that opens the
+    The box is strained to where the root of u that is linear in the strain reaches that of u0. Where that opens the
     packing, fractions of the strain are tried. A minimum that stalls at u0, where a contact is about to open or close,
     is approached again from a higher energy.
 
@@ -374,11 +382,11 @@ class Leading:
 
     def _step(self, landscape: Landscape, target: Target) -> Minimum | None:
         """Strain the box towards u0 and minimise; return the state if the packing is lost."""
-        root = _towards(self.jammed, self.aim, self.part)
-        strain = _strain_to(self.jammed, root)
+        root = _towards(landscape, self.jammed, self.aim, self.part)
+        strain = _strain_to(landscape, self.jammed, root)
         wanted = replace(target, tolerance=self.tolerance)
         strained = replace(self.jammed, state=followed(landscape, self.jammed, strain))
-        found = _relaxed(landscape, strained, wanted, root**2)
+        found = _relaxed(landscape, strained, wanted, root**landscape.law.power)
         self.n_minima += 1
         if found.outcome is not Outcome.UNJAMMED:
             self.jammed, self.part = found, min(2 * self.part, 1.0)
@@ -411,16 +419,19 @@ class Leading:
         self.cycle += 1
         if self.cycle == _CYCLES:
             return self.best
-        higher = found.state.strained(_strain_to(found, _towards(found, _HIGHER * target.u0)))
+        u = fraction_of_energy(landscape, _HIGHER) * target.u0
+        strain = _strain_to(landscape, found, _towards(landscape, found, u))
+        higher = found.state.strained(strain)
         self.jammed, self.is_new = replace(found, state=higher), True
         return None
 
 
 def _relaxed(landscape: Landscape, at: Minimum, target: Target, u: float) -> Minimum:
     """Minimise, to full tolerance only if u, the expected energy density, is nearly u0."""
-    near = abs(math.sqrt(u / target.u0) - 1) < _NEAR
+    near = abs(landscape.law.root(u / target.u0) - 1) < _NEAR
     tolerance = target.tolerance if near else max(target.tolerance, _GOOD_TO_MOVE)
-    return minimise(landscape, at.state, "near", Stop(tolerance, lowest=_FALLEN * u), at.history)
+    stop = Stop(tolerance, lowest=fraction_of_energy(landscape, _FALLEN) * u)
+    return minimise(landscape, at.state, "near", stop, at.history)
 
 
 def nearer(landscape: Landscape, at: Minimum, u0: float) -> State:
@@ -440,7 +451,7 @@ def nearer(landscape: Landscape, at: Minimum, u0: float) -> State:
     State
         To be minimised.
     """
-    return followed(landscape, at, _strain_to(at, _towards(at, u0)))
+    return followed(landscape, at, _strain_to(landscape, at, _towards(landscape, at, u0)))
 
 
 def followed(landscape: Landscape, at: Minimum, strain: float) -> State:
@@ -466,22 +477,23 @@ def followed(landscape: Landscape, at: Minimum, strain: float) -> State:
     return local_model.base
 
 
-def _towards(at: Minimum, u0: float, part: float = 1.0) -> float:
-    """Return sqrt(u) after a fraction of the way to u0, limited to a bounded factor."""
-    now, aim = math.sqrt(at.energy_density), math.sqrt(u0)
+def _towards(landscape: Landscape, at: Minimum, u0: float, part: float = 1.0) -> float:
+    """Return the root of u after a fraction of the way to u0, limited to a bounded factor."""
+    now, aim = landscape.law.root(at.energy_density), landscape.law.root(u0)
     aim = min(max(aim, now / _LARGEST_FACTOR), now * _LARGEST_FACTOR)
     return now + part * (aim - now)
 
 
-def _strain_to(at: Minimum, root: float) -> float:
-    """Return the strain at which sqrt(u) has this value.
+def _strain_to(landscape: Landscape, at: Minimum, root: float) -> float:
+    """Return the strain at which the root of u has this value.
 
     The energy of a minimum changes with strain as if the particles did not move, to first order.
     """
     energy, volume = at.evaluation.energy, at.state.volume
-    now = math.sqrt(energy / volume)
+    power, now = landscape.law.power, landscape.law.root(energy / volume)
     slope = at.evaluation.strain_gradient - at.state.dimension * energy
-    return (root - now) * 2 * now * volume / slope
+    strain: float = (root - now) * power * now ** (power - 1) * volume / slope
+    return strain
 
 
 def _judged(landscape: Landscape, at: Minimum, target: Target) -> Minimum:
@@ -495,8 +507,9 @@ def _judged(landscape: Landscape, at: Minimum, target: Target) -> Minimum:
     if at.residual.largest > _SLIDING:
         return replace(at, outcome=Outcome.STALLED)  # sufficient only for a step on the way
     local_model = LocalEnergyModel(landscape, at.state)
-    newton = local_model.newton(_SOFT * landscape.stiffness / landscape.length**2)
     evaluation = at.evaluation
+    stiffness = landscape.stiffness_at(evaluation.bond_force)
+    newton = local_model.newton(_SOFT * stiffness / landscape.length**2)
     for _ in range(_STIFF_STEPS):
         newton.prepare()
         [relax] = newton.solve(-evaluation.gradient[None], _ACCURACY)

@@ -18,7 +18,7 @@ from jamshape.packing.columns import as_columns, kept
 from jamshape.packing.given import as_floats, as_integers
 from jamshape.packing.rotation import UNIT_QUATERNION_TOLERANCE, across, body_axes
 from jamshape.records import Record
-from jamshape.shapes.shape import Interaction, Shape, stiffness_of
+from jamshape.shapes.shape import Interaction, Shape, power_of, stiffness_of
 from jamshape.shapes.table import DEFAULT, shape_named
 
 # Fields reset when one of these is replaced.
@@ -331,7 +331,7 @@ def _check_labels(packing: Packing) -> None:
 def _checked_law(law: Interaction, species: IntArray) -> Interaction:
     """Return the constants of the contacts of particles of some species, or raise a ValueError."""
     try:
-        k_e, sides = stiffness_of(law[0]), int(law[1])
+        k_e, sides, power = stiffness_of(law[0]), int(law[1]), power_of(law[2])
         is_law = (
             (isinstance(k_e, tuple) or 0 < k_e < np.inf)
             and sides in {1, 2}
@@ -342,8 +342,8 @@ def _checked_law(law: Interaction, species: IntArray) -> Interaction:
         is_law = False
     if not is_law:
         msg = (
-            f"law is {law!r}, expected Interaction(k_e, sides) with a positive k_e, or a symmetric table of them by"
-            " species, and sides 1 or 2"
+            f"law is {law!r}, expected Interaction(k_e, sides, power) with a positive k_e, or a symmetric table of them"
+            " by species, sides 1 or 2, and a power of at least 2"
         )
         raise ValueError(msg)
     if isinstance(k_e, tuple) and len(k_e) < species.max():
@@ -352,7 +352,7 @@ def _checked_law(law: Interaction, species: IntArray) -> Interaction:
             " largest of the packing"
         )
         raise ValueError(msg)
-    return Interaction(k_e, sides)
+    return Interaction(k_e, sides, power)
 
 
 def _check_shapes(packing: Packing) -> None:

@@ -117,8 +117,9 @@ def plan(start: Callable[[], Packing], settings: Approach, made_from: Mapping[st
 
     def begin() -> ApproachDriver:
         # As the file has it: LAMMPS's own copy has other bits.
-        law = Interaction(sides=2)
-        return ApproachDriver(start().sorted_by_id().with_(law=law, step=0, time=0.0), settings)
+        first = start().sorted_by_id()
+        law = Interaction(sides=2, power=first.law.power)
+        return ApproachDriver(first.with_(law=law, step=0, time=0.0), settings)
 
     def restore(first: Packing, checkpoint: Checkpoint) -> ApproachDriver:
         return ApproachDriver(first, settings, checkpoint)

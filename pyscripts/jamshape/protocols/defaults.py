@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from jamshape.checks import (
     RANGES,
     ArgumentError,
+    require_in,
     require_no_effect,
     require_one_of,
     require_stated,
@@ -33,6 +34,7 @@ from jamshape.protocols.recipe import (
 )
 from jamshape.protocols.source import Source
 from jamshape.shapes.particles import Particles
+from jamshape.shapes.shape import HARMONIC, Interaction, law_text
 
 # Largest residual of a minimum before the search for an energy.
 _TIGHT = 1e-8
@@ -70,13 +72,25 @@ class UsualProtocol(NamedTuple):
         return dict(self.usual) | (dict(self.in_plane) if dimension == 2 else {})
 
 
+def _of_law(get: Values, energy: float) -> float:
+    """Return the energy of the recipe's contacts that has the overlaps of harmonic ones of an energy."""
+    return energy * Interaction(power=get["power"]).over_harmonic(energy)
+
+
 def _by_dynamics(get: Values) -> tuple[Way, Target | None]:
+    if get["power"] != HARMONIC:
+        msg = (
+            f"the protocol dynamics has pressures of harmonic contacts, found the law {law_text(get['power'])}; take the"
+            " protocol quasistatic or marschall-2018"
+        )
+        raise ValueError(msg)
     way = Dynamics(Approach(kappa=get["kappa"], p_end=get["p_end"]))
     return way, _target(get, get["tolerance"])
 
 
 def _by_steps(get: Values) -> tuple[Way, Target | None]:
-    quasistatic = Quasistatic(step=get["delta_phi"], tolerance=get["tolerance"])
+    energy = _of_law(get, Quasistatic.energy)
+    quasistatic = Quasistatic(step=get["delta_phi"], energy=energy, tolerance=get["tolerance"])
     thermal = Thermalisation(get["phi_thermal"], get["n_sweeps"]) if "n_sweeps" in get else None
     return Steps(quasistatic, thermal), _target(get, min(get["tolerance"], _TIGHT))
 
@@ -85,8 +99,8 @@ def _by_adaptive_steps(get: Values) -> tuple[Way, Target | None]:
     step, tolerance = get["delta_phi"], get["tolerance"]
     coarse = max(_COARSE, step)
     rough = _ROUGH if get["u0"] else tolerance
-    energy = {"energy": _LOOSE * step**2} if get["u0"] else {}
-    quasistatic = Quasistatic(step=step, tolerance=rough, coarse=coarse, **energy)
+    energy = _of_law(get, _LOOSE * step**2 if get["u0"] else Quasistatic.energy)
+    quasistatic = Quasistatic(step=step, energy=energy, tolerance=rough, coarse=coarse)
     return Adaptive(quasistatic), _target(get, tolerance)
 
 
@@ -203,10 +217,11 @@ def recipe_for(
     name = "quasistatic" if protocol is None else protocol_named(protocol)
     require_one_of("protocol", name, PROTOCOLS)
     usual = PROTOCOLS[name]
-    get = usual.defaults(dimension) | _allowed(given, usual, name)
+    get = usual.defaults(dimension) | {"power": particles.power}
+    get |= {"u0": _of_law(get, get["u0"])} | _allowed(given, usual, name, particles.power)
     aim = aim_of(get, given, **other)
     if aim is not None:
-        get |= {"u0": aim.u0 or _IN_BETWEEN, "accuracy": aim.accuracy}
+        get |= {"u0": aim.u0 or _of_law(get, _IN_BETWEEN), "accuracy": aim.accuracy}
     require_with("u0", get["u0"] or None, accuracy=given.get("accuracy"))
     get |= {} if source is None else _of_source(source, given)
     how, target = usual.compose(get)
@@ -227,7 +242,7 @@ def aim_of(
     Parameters
     ----------
     get
-        u0 and tolerance.
+        u0, tolerance and the power of the law.
     given
         Those that were typed, and the accuracy.
     pressure, phi, box
@@ -238,6 +253,10 @@ def aim_of(
     ValueError
         If settings contradict each other or are out of their ranges.
     """
+    if pressure is not None:
+        require_in("pressure", pressure, Interaction(power=get["power"]).range_of("pressure"))
+    if phi is not None:
+        require_stated(phi=phi)
     require_no_effect("pressure", pressure, u0=given.get("u0"), phi=phi)
     require_no_effect("phi", phi, u0=given.get("u0"))
     if box == FIXED:
@@ -263,7 +282,9 @@ def _placed(particles: Particles | None, dimension: int | None) -> tuple[Particl
     return particles, dimension
 
 
-def _allowed(given: dict[str, Any], usual: UsualProtocol, protocol: str) -> dict[str, Any]:
+def _allowed(
+    given: dict[str, Any], usual: UsualProtocol, protocol: str, power: float
+) -> dict[str, Any]:
     """Drop settings that are None, and refuse invalid ones."""
     known = dict.fromkeys(name for protocol in PROTOCOLS.values() for name in protocol.usual)
     for name, value in given.items():
@@ -274,7 +295,9 @@ def _allowed(given: dict[str, Any], usual: UsualProtocol, protocol: str) -> dict
             said = f"{{{name}:name}} does not apply to the protocol {protocol}, expected another protocol or setting"
             raise ArgumentError(said, {name: value})
     kept = {name: value for name, value in given.items() if value is not None}
-    require_stated(**{name: value for name, value in kept.items() if name in RANGES})
+    if "u0" in kept:
+        require_in("u0", kept["u0"], Interaction(power=power).range_of("u0"))
+    require_stated(**{name: kept[name] for name in kept if name in RANGES and name != "u0"})
     return kept
 
 

@@ -124,7 +124,7 @@ def plan(recipe: Recipe, seeds: Sequence[int], means: Means) -> Plan:
     seeds : sequence of int
     means : Means
     """
-    own = {name: value for name, value in recipe.attributes().items() if name != "seed"}
+    own = {name: value for name, value in recipe.identity.items() if name != "seed"}
     samples = [dataclasses.replace(recipe, seed=seed) for seed in seeds]
 
     def begin() -> EnsembleDriver:

@@ -19,7 +19,7 @@ from jamshape.files.checkpoint import Checkpoint
 from jamshape.landscape import Landscape, State
 from jamshape.minima import Minimum, Outcome, Stop, minimise, residual_of
 from jamshape.minima.boxes import ISOTROPIC, Yielding
-from jamshape.minima.target import Search, Target, TargetError, extrapolation
+from jamshape.minima.target import Search, Target, TargetError, extrapolation, fraction_of_energy
 from jamshape.packing import Packing
 from jamshape.protocols.recipe import Aim
 from jamshape.protocols.retry import Retry, go_on
@@ -72,14 +72,15 @@ def bring(landscape: Landscape, state: State, goal: Aim) -> Minimum:
 def _opened(landscape: Landscape, state: State, goal: Target) -> State:
     """Open the box until u is about u0; sliding rods would make small steps slow.
 
-    As in `measures.packing_summary.energy_onset`, sqrt(u) is linear in phi: d sqrt(u)/dphi = (p + u) / (2 phi sqrt(u)).
+    As in `measures.packing_summary.energy_onset`, a root of u is linear in phi.
     """
     evaluation, volume, D = landscape.evaluate(state), state.volume, state.dimension
     u, p = evaluation.energy / volume, -evaluation.strain_gradient / (D * volume)
     if u <= goal.u0:
         return state
-    strain = 2 * u / (p + u) * (1 - math.sqrt(goal.u0 / u)) / D
-    stop = Stop(goal.tolerance, lowest=_FALLEN * goal.u0, evaluations=_EVALUATIONS)
+    strain = landscape.law.power * u / (p + u) * (1 - landscape.law.root(goal.u0 / u)) / D
+    lowest = fraction_of_energy(landscape, _FALLEN) * goal.u0
+    stop = Stop(goal.tolerance, lowest=lowest, evaluations=_EVALUATIONS)
     found = minimise(landscape, state.strained(strain), "newton", stop)
     return state if found.outcome is Outcome.UNJAMMED else found.state
 
@@ -219,7 +220,7 @@ class LadderDriver:
     def results(self) -> dict[str, Any]:
         """Return the law, and counts so far."""
         counts = {"ladder_done": self._n_done, "evaluations": self._evaluations}
-        return self._first.law._asdict() | counts
+        return self._first.law.stated() | counts
 
     def close(self) -> None:
         """Nothing is held outside of Python."""

@@ -59,6 +59,7 @@ from jamshape.protocols.stages import (
 )
 from jamshape.recording.driver import Plan, Row
 from jamshape.recording.recorder import How, record, stopped
+from jamshape.shapes.shape import Interaction
 
 __all__ = [
     "Adaptive",
@@ -150,7 +151,7 @@ def _plan(
         del first
         return Pipeline(recipe, source, checkpoint, retry=retry)
 
-    return Plan(MAKING, "a packing", recipe.attributes(), begin, restore, finish=finish)
+    return Plan(MAKING, "a packing", recipe.identity, begin, restore, finish=finish)
 
 
 def _making_file(out: Path) -> Path:
@@ -214,7 +215,7 @@ def _compression(recipe: Recipe) -> Plan:
             recipe.target.require(Landscape(packing))
         return packing
 
-    told, way = recipe.before_target(), recipe.way
+    told, way = {"law": None} | recipe.before_target(), recipe.way
     if isinstance(way, Dynamics):
         return approach.plan(start, way.approach, told)
     assert isinstance(way, Compressed)
@@ -384,14 +385,14 @@ def _last_row(run: Path) -> dict[str, float]:
 
 def onsets_of(run: Path) -> dict[str, float]:
     """phi_J from p(phi) (Marschall & Teitel 2018, Fig. 4), closing and opening the box; NaN if none."""
-    observables = read_observables(run)
+    observables, power = read_observables(run), Interaction.told(read_attributes(run)).power
     rising = observables["kappa"] > 0
     found: dict[str, float] = {}
     for name, rows in (("compression", rising), ("opening", ~rising)):
         order = np.argsort(observables["phi"][rows])
         phi, p = (observables[key][rows][order] for key in ("phi", "pressure"))
         try:
-            fit = fit_onset(phi, p)
+            fit = fit_onset(phi, p, power=power)
         except ValueError:
             fit = OnsetFit(np.nan, np.nan, np.nan, 0, 0)
         found |= {f"phi_J_{name}": fit.phi_J, f"phi_J_{name}_error": fit.phi_J_error}
@@ -424,5 +425,5 @@ def require_same(out: Path, recipe: Recipe) -> None:
     ------
     ValueError
     """
-    require_attributes(out, recipe.attributes())
+    require_attributes(out, recipe.identity)
     recipe.require_particles(out)

@@ -16,7 +16,7 @@ from jamshape.checks import require_positive
 from jamshape.contacts import CrossingError
 from jamshape.landscape import Landscape
 from jamshape.minima import History, Minimum, Outcome, Stop, minimise
-from jamshape.minima.target import nearer
+from jamshape.minima.target import fraction_of_energy, nearer
 from jamshape.packing import State
 
 # Smallest step: the energy jumps there, by a rearrangement.
@@ -30,7 +30,7 @@ _MOST_PARTS = 40  # of them before it is given up
 
 # Before a search for an energy the box is compressed further after one part, once in a row, if U/N is below a multiple
 # of the energy tolerance, about what a step adds to a jammed packing: the search opens it again, while the evaluations
-# to the end of such a minimisation grow with N.
+# to the end of such a minimisation grow with N. A multiple of energies of harmonic contacts.
 _LITTLE = 50.0
 
 _FEW, _MANY = 40, 150  # evaluations of minimisations after which steps grow and shrink
@@ -187,7 +187,8 @@ def advance(landscape: Landscape, compression: QuasistaticRun, protocol: Quasist
     compression.parts += 1
     per_particle = found.evaluation.energy / landscape.particles.n
     is_unfinished = found.outcome is Outcome.EXHAUSTED
-    if is_unfinished and _may_be_left(compression, per_particle, protocol):
+    little = fraction_of_energy(landscape, _LITTLE)
+    if is_unfinished and _may_be_left(compression, per_particle / little, protocol):
         compression.parts, compression.left = 0, True
         compression.loose, compression.loose_phi = found.state, compression.phi
         compression.begin(_next_step(compression.step, _PART, protocol))
@@ -223,7 +224,7 @@ def _may_be_left(compression: QuasistaticRun, per_particle: float, protocol: Qua
     """Whether a long minimisation close to jamming need not be finished before the next step."""
     if not _is_rough(protocol) or compression.left or compression.loose is None:
         return False
-    return math.isnan(compression.jammed_phi) and per_particle <= _LITTLE * protocol.energy
+    return math.isnan(compression.jammed_phi) and per_particle <= protocol.energy
 
 
 def _is_narrow(compression: QuasistaticRun) -> bool:

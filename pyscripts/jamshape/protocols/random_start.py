@@ -14,6 +14,7 @@ from jamshape.checks import RANGES, require_in, require_one_of, require_stated
 from jamshape.packing import Box, Packing
 from jamshape.packing.plain import unturned
 from jamshape.shapes.particles import Particles
+from jamshape.shapes.shape import Interaction
 
 # Trial placements: a few seconds for 1000 particles.
 _ATTEMPTS, _ATTEMPTS_PER_PARTICLE = 200_000, 500
@@ -138,6 +139,7 @@ def _unplaced(
         id=1 + np.arange(n),
         box=Box(lo=np.zeros(dimension), edges=np.ones(dimension)),
         shape_style=particles.shape.name,
+        law=Interaction(power=particles.power),
     )
     return unplaced, rng
 

@@ -367,6 +367,11 @@ class Recipe:
         strict |= {"stable_to_shear": True} if self.stable_to_shear else {}
         return self.before_target() | (self.target.settings if self.target else {}) | strict
 
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Return `attributes`, with None for what is not to be in a file of this recipe."""
+        return {"law": None} | self.attributes()
+
     def before_target(self) -> dict[str, Any]:
         """Return the attributes that identify the stages before the energy search."""
         numbers = {"n": self.n, "seed": self.seed, "phi_start": self.phi_start}

@@ -18,7 +18,7 @@ import numpy as np
 from jamshape.contacts import CrossingError
 from jamshape.landscape import Landscape
 from jamshape.minima import Minimum, Outcome, Stop, minimise
-from jamshape.minima.target import Search, Target, TargetError, extrapolation
+from jamshape.minima.target import Search, Target, TargetError, extrapolation, fraction_of_energy
 from jamshape.packing import State
 from jamshape.vibration.sliding import Sliding
 
@@ -149,7 +149,8 @@ def _slide(landscape: Landscape, retry: Retry, target: Target) -> None:
 
 def _balance(landscape: Landscape, retry: Retry, target: Target) -> None:
     """Balance forces at a fixed box, and if they do, return the packing to u0."""
-    stop = Stop(target.tolerance, lowest=_FALLEN * target.u0, evaluations=_EVALUATIONS)
+    lowest = fraction_of_energy(landscape, _FALLEN) * target.u0
+    stop = Stop(target.tolerance, lowest=lowest, evaluations=_EVALUATIONS)
     found = minimise(landscape, retry.state, "newton", stop)
     if found.is_at_rest:
         _lead(landscape, retry, found.state, target)

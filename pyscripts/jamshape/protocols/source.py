@@ -38,7 +38,8 @@ class Source(NamedTuple):
         """Read any H5MD file of particles, a run or a packing; errors as `read_packing`."""
         stored, last = read_attributes(path), read_packing(path)
         given = Particles.given(last.shape, last.diameters, last.form, last.species)
-        names = [*(one.name for one in last.shape.parameters), "size_ratio", "kinds"]
+        given = given.under(last.law.power)
+        names = [*(one.name for one in last.shape.parameters), "size_ratio", "kinds", "law"]
         told = {name: stored[name] for name in names if name in stored}
         particles = dataclasses.replace(given, told=told) if told else given
         kappa = rate_of(stored) if "kappa" in stored else 0.0
@@ -75,12 +76,14 @@ class Source(NamedTuple):
             raise ValueError(msg)
 
     def _has(self, particles: Particles) -> bool:
-        if particles.shape.name != self.particles.shape.name:
+        own = self.particles
+        if (particles.shape.name, particles.power) != (own.shape.name, own.power):
             return False
-        own, other = (
-            p.sample(self.n, np.random.default_rng(self.seed)) for p in (self.particles, particles)
+        rows, others = (
+            np.column_stack([drawn.diameters, drawn.form])
+            for p in (own, particles)
+            for drawn in [p.sample(self.n, np.random.default_rng(self.seed))]
         )
-        rows, others = (np.column_stack([x.diameters, x.form]) for x in (own, other))
         return np.array_equal(_sorted(rows), _sorted(others))
 
 

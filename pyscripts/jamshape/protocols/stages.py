@@ -32,6 +32,7 @@ from jamshape.protocols.retry import Retry
 from jamshape.protocols.strict import StrictSearch
 from jamshape.protocols.thermal import Thermal, without_overlaps
 from jamshape.recording.driver import Told
+from jamshape.shapes.shape import Interaction
 from jamshape.vibration.stability import stability_of
 
 MOST_MINIMISATIONS = 20_000
@@ -229,7 +230,9 @@ class Searching:
                 f" {making.target.u0:.3g}; use a start nearer to jamming, or extrapolation"
             )
             raise TargetError(msg)
-        text = f"{_where(search, making.target, last)}, minimisation {self._n}"
+        text = (
+            f"{_where(search, making.target, last, making.landscape.law)}, minimisation {self._n}"
+        )
         return making.told(f"search for u0 = {making.target.u0:g}", text, search.state)
 
     def checkpoint(self) -> Checkpoint:
@@ -248,15 +251,15 @@ class Searching:
         }
 
 
-def _where(search: Search, target: Target, last: float) -> str:
+def _where(search: Search, target: Target, last: float, law: Interaction) -> str:
     """Describe where a search is; `last` is u before its last step."""
     u, residual = search.history.energy_density[-1], search.history.residual[-1]
     ratio = f"u/u0 {u / target.u0:.3g}" if u > 0 else "unjammed"
     text = f"u {u:.2e}, {ratio}, residual {residual:.1e} of {target.tolerance:.0e}, step {search.step:.1e}"
     if not target.u0 < u < last:
         return text
-    # Equal steps down to u0, estimated from sqrt(u), which is linear in the strain.
-    now, before, aim = map(math.sqrt, (u, last, target.u0))
+    # Equal steps down to u0, estimated from the root of u that is linear in the strain.
+    now, before, aim = map(law.root, (u, last, target.u0))
     return f"{text}, about {math.ceil((now - aim) / (before - now))} more of it"
 
 

@@ -6,7 +6,7 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from typing import Any
 
 from jamshape.shapes.particles import Kind, Particles, parse_kind
-from jamshape.shapes.shape import Parameter, Shape
+from jamshape.shapes.shape import HARMONIC, Parameter, Shape, power_of
 from jamshape.shapes.table import DEFAULT, SHAPES, shape_named
 
 
@@ -20,6 +20,11 @@ def add_particle_options(parser: ArgumentParser) -> None:
         group.add_argument(f"--{option}", type=kind, help=f"{known[0][1].meaning} ({usual})")
     usual = ", ".join(f"{shape.name} {shape.size_ratio:g}" for shape in SHAPES.values())
     group.add_argument("--size-ratio", type=float, help=f"big over small, mixed 1:1 ({usual})")
+    group.add_argument(
+        "--law",
+        type=_law,
+        help="law of their contacts: harmonic, hertz or the power of the overlap in the energy (harmonic)",
+    )
     group.add_argument(
         "--kind",
         type=_kind,
@@ -53,17 +58,18 @@ def particles_of(options: Namespace) -> Particles:
         If an option does not belong to the shape, or is out of its range.
     """
     shape, given = _shape(options), _given(options)
+    law = HARMONIC if options.law is None else options.law
     if options.kind:
         if given or options.size_ratio is not None:
             msg = "--kind excludes --size-ratio and a shape's parameters, expected a mixture's numbers in --kind"
             raise ValueError(msg)
-        return Particles.mixture(shape, options.kind)
-    return Particles.of(shape, options.size_ratio, **given)
+        return Particles.mixture(shape, options.kind).under(law)
+    return Particles.of(shape, options.size_ratio, **given).under(law)
 
 
 def are_particles_given(options: Namespace) -> bool:
     """Whether any of the options of `add_particle_options` was given."""
-    others = options.shape, options.size_ratio
+    others = options.shape, options.size_ratio, options.law
     return bool(options.kind or _given(options)) or any(value is not None for value in others)
 
 
@@ -99,6 +105,13 @@ def _parameters() -> dict[str, list[tuple[Shape, Parameter]]]:
         for parameter in shape.parameters:
             found.setdefault(parameter.option, []).append((shape, parameter))
     return found
+
+
+def _law(text: str) -> float:
+    try:
+        return power_of(text)
+    except ValueError as error:
+        raise ArgumentTypeError(str(error)) from None
 
 
 def _kind(text: str) -> Kind:

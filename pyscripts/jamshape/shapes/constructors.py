@@ -26,6 +26,9 @@ Parameters
 size_ratio : float, optional
     Size ratio of big and small particles, mixed 1:1, with the same parameters; {size_ratio:g} by default, 1 for
     equal particles.
+law : str or float, optional
+    Law of the contacts: ``"harmonic"`` (default), ``"hertz"``, or the power of the overlap in the energy of a contact, at
+    least 2.
 **kinds : float or (k,) array
     ``size`` over the unit of length, {unit} (1); ``share``, number fraction of the kind up to normalisation (1);
     ``spread``, standard deviation of the logarithm of the size (0). These exclude `size_ratio`. Arrays make a
@@ -64,7 +67,10 @@ def constructor(shape: Shape) -> Callable[..., Particles]:
         given = signature.bind(*args, **kwargs)
         given.apply_defaults()
         numbers = dict(given.arguments)
-        return _particles(shape, numbers, numbers.pop("size_ratio"), numbers.pop("kinds"))
+        law = numbers.pop("law")
+        return _particles(shape, numbers, numbers.pop("size_ratio"), numbers.pop("kinds")).under(
+            law
+        )
 
     make.__signature__ = signature  # type: ignore[attr-defined]
     make.__name__ = make.__qualname__ = shape.compiled_name
@@ -81,8 +87,9 @@ def signature_of(shape: Shape) -> Signature:
         for p in shape.parameters
     ]
     ratio = inspect.Parameter("size_ratio", either, default=None, annotation="float | None")
+    law = inspect.Parameter("law", either, default="harmonic", annotation="str | float")
     kinds = inspect.Parameter("kinds", inspect.Parameter.VAR_KEYWORD, annotation="ArrayLike")
-    return Signature([*arguments, ratio, kinds], return_annotation="Particles")
+    return Signature([*arguments, ratio, law, kinds], return_annotation="Particles")
 
 
 def _text_of(shape: Shape) -> str:

@@ -7,6 +7,7 @@ from jamshape.shapes.particles import Particles
 def Spherocylinders(
     alpha: ArrayLike = 4.0,
     size_ratio: float | None = None,
+    law: str | float = ...,
     **kinds: ArrayLike,
 ) -> Particles: ...
 def Superellipsoids(
@@ -14,21 +15,25 @@ def Superellipsoids(
     w1: ArrayLike = 1.0,
     w2: ArrayLike = 1.0,
     size_ratio: float | None = None,
+    law: str | float = ...,
     **kinds: ArrayLike,
 ) -> Particles: ...
 def Dimers(
     alpha: ArrayLike = 1.0,
     size_ratio: float | None = None,
+    law: str | float = ...,
     **kinds: ArrayLike,
 ) -> Particles: ...
 def Clumps(
     discs: ArrayLike = ...,
     size_ratio: float | None = None,
+    law: str | float = ...,
     **kinds: ArrayLike,
 ) -> Particles: ...
 def Spheropolygons(
     corners: ArrayLike = ...,
     rounding: ArrayLike = 0.1,
     size_ratio: float | None = None,
+    law: str | float = ...,
     **kinds: ArrayLike,
 ) -> Particles: ...

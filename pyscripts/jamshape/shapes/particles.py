@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from jamshape.arguments import checked, checked_fields
 from jamshape.arrays import FloatArray, IntArray, real_numbers, whole_numbers
 from jamshape.checks import RANGES, require_in, require_stated
-from jamshape.shapes.shape import Shape
+from jamshape.shapes.shape import HARMONIC, Shape, law_text, power_of
 from jamshape.shapes.table import DEFAULT, shape_named
 
 
@@ -78,6 +78,8 @@ class Particles:
         from the `numpy.random.Generator`.
     told : mapping
         Metadata for files.
+    power : float
+        Of the overlap in the energy of their contacts, as in `Interaction`.
 
     Examples
     --------
@@ -90,10 +92,34 @@ class Particles:
     shape: Shape
     draw: Callable[[int, np.random.Generator], Sizes]
     told: Mapping[str, Any]
+    power: float = HARMONIC
 
     def __repr__(self) -> str:
         known = [f"{k}={v if isinstance(v, str) else format(v, 'g')}" for k, v in self.told.items()]
         return f"Particles({', '.join([repr(self.shape.name), *known])})"
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Return `told` with all that identifies the particles in a file: None for a law that is not to be there."""
+        return {"law": None} | dict(self.told)
+
+    def under(self, law: str | float) -> Particles:
+        """Return the same particles with another law of their contacts.
+
+        Parameters
+        ----------
+        law : str or float
+            ``"harmonic"``, ``"hertz"``, or the power of the overlap in the energy of a contact, at least 2.
+
+        Raises
+        ------
+        ValueError
+            If it is none of these.
+        """
+        power = power_of(law)
+        own = {"law": law_text(power)} if power != HARMONIC else {}
+        told = {name: value for name, value in self.told.items() if name != "law"} | own
+        return replace(self, told=told, power=power)
 
     @classmethod
     @checked
@@ -167,11 +193,14 @@ class Particles:
     def again(cls, shape: str, told: Mapping[str, Any]) -> Particles | None:
         """Make particles from their `told`; None if it does not describe them, as of those given one by one."""
         own = [parameter.name for parameter in shape_named(shape).parameters]
+        law = told.get("law", HARMONIC)
         if "kinds" not in told:
             parameters = {name: told[name] for name in own if name in told}
-            return cls.of(shape, told.get("size_ratio"), **parameters)
+            return cls.of(shape, told.get("size_ratio"), **parameters).under(law)
         kinds = [text for text in str(told["kinds"]).split("; ") if "=" in text]
-        return cls.mixture(shape, [parse_kind(text) for text in kinds]) if kinds else None
+        return (
+            cls.mixture(shape, [parse_kind(text) for text in kinds]).under(law) if kinds else None
+        )
 
     def sample(self, n: int, rng: np.random.Generator) -> Sizes:
         """Draw n particles.

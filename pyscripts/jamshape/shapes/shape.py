@@ -7,6 +7,8 @@ of a particle, and draws it.
 from __future__ import annotations
 
 import importlib
+import math
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias
@@ -15,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jamshape.arrays import real_numbers
-from jamshape.checks import Range, require_in, said
+from jamshape.checks import RANGES, Range, require_in, said
 
 if TYPE_CHECKING:
     from jamshape.arrays import FloatArray, IntArray
@@ -153,6 +155,58 @@ def _types_of_forms(species: IntArray, form: FloatArray) -> tuple[IntArray, IntA
     return rows[:, -1].astype(np.int64), 1 + of.reshape(-1).astype(np.int64)
 
 
+HARMONIC = 2.0
+"""Power of the overlap in the energy of a harmonic contact, the smallest one."""
+
+_NAMED_POWERS = {"harmonic": HARMONIC, "hertz": 2.5}
+_GENERAL = "power"
+
+
+def power_of(law: str | float) -> float:
+    """Return the power A of a law of contacts, of which the energy of a bond is k_e / A times the overlap to the A.
+
+    Parameters
+    ----------
+    law : str or float
+        ``"harmonic"`` (2), ``"hertz"`` (5/2), a number of at least 2, or that number as text, with ``power`` before it as
+        in LAMMPS.
+
+    Raises
+    ------
+    ValueError
+        If it is none of these.
+
+    Examples
+    --------
+    >>> power_of("hertz"), power_of(3), power_of("power 3")
+    (2.5, 3.0, 3.0)
+    """
+    if isinstance(law, str) and law in _NAMED_POWERS:
+        return _NAMED_POWERS[law]
+    try:
+        power = float(law.removeprefix(_GENERAL) if isinstance(law, str) else law)
+    except (TypeError, ValueError):
+        power = float("nan")
+    if not HARMONIC <= power < float("inf"):
+        msg = (
+            f"law is {said(law)}, expected harmonic, hertz or a power of the overlap of at least 2"
+        )
+        raise ValueError(msg)
+    return power
+
+
+def law_text(power: float) -> str:
+    """Return the words of a law in LAMMPS's commands and in files, of which `power_of` makes the power again.
+
+    Examples
+    --------
+    >>> law_text(2.5), law_text(3.0)
+    ('hertz', 'power 3.0')
+    """
+    names = {of_name: name for name, of_name in _NAMED_POWERS.items()}
+    return names.get(power, f"{_GENERAL} {power!r}")
+
+
 class Interaction(NamedTuple):
     """Constants of the contacts: beside the particles, all that energy and forces of a packing depend on.
 
@@ -163,6 +217,9 @@ class Interaction(NamedTuple):
         LAMMPS has it by type in ``pair_coeff I J k_e``. A packing keeps a table as a tuple of tuples.
     sides : {1, 2}
         Bonds of a side-to-side contact, for shapes that have both laws.
+    power : float or str
+        Power A of the overlap x in the energy of a bond, (k_e / A) x^A: 2 for harmonic contacts, 5/2 for those of Hertz, or
+        another number of at least 2; or the name of a law, as `power_of` reads it.
 
     Examples
     --------
@@ -175,6 +232,12 @@ class Interaction(NamedTuple):
     >>> round(float(stiff.u / discs.u), 12)
     2.0
 
+    Hertz's law, for an overlap x = 0.1:
+
+    >>> hertz = discs.with_(law=js.Interaction(power="hertz"))
+    >>> hertz.law.power, round(float(hertz.u / discs.u) / (2 / 2.5 * 0.1**0.5), 12)
+    (2.5, 1.0)
+
     Contacts of two species, and between them:
 
     >>> mixed = discs.with_(species=[1, 2], law=js.Interaction(k_e=[[1, 3], [3, 2]]))
@@ -186,18 +249,67 @@ class Interaction(NamedTuple):
     """[energy]"""
     sides: int = 2
     """Bonds of a side-to-side contact, 1 or 2, for shapes that have both laws."""
+    power: float = HARMONIC
+    """Power of the overlap in the energy of a bond."""
 
     @classmethod
     def told(cls, known: Mapping[str, Any]) -> Interaction:
         """Read the constants from a mapping by name; defaults where missing."""
         usual = cls()
-        k_e, sides = (known.get(name, getattr(usual, name)) for name in cls._fields)
-        return cls(stiffness_of(k_e), int(sides))
+        k_e, sides, power = (known.get(name, getattr(usual, name)) for name in cls._fields)
+        return cls(stiffness_of(k_e), int(sides), power_of(power))
 
-    def but(self, k_e: ArrayLike | None = None, sides: int | None = None) -> Interaction:
+    def but(
+        self,
+        k_e: ArrayLike | None = None,
+        sides: int | None = None,
+        power: str | float | None = None,
+    ) -> Interaction:
         """Replace the constants that are not None."""
         stiffness = self.k_e if k_e is None else stiffness_of(k_e)
-        return Interaction(stiffness, self.sides if sides is None else sides)
+        of_bond = self.power if power is None else power_of(power)
+        return Interaction(stiffness, self.sides if sides is None else sides, of_bond)
+
+    def root(self, energy: float) -> float:
+        """Return the root of an energy that is linear in the overlaps, and so in phi - phi_J."""
+        root: float = energy ** (1 / self.power)
+        return math.sqrt(energy) if self.power == HARMONIC else root
+
+    def over_harmonic(self, energy: float) -> float:
+        """Return the energy of a contact over that of a harmonic one of the same overlap, which is given in units of k_e.
+
+        Examples
+        --------
+        An overlap of 0.01, with the energies x^2 and (2 / 2.5) x^2.5 of two contacts:
+
+        >>> round(1e-4 * Interaction(power=2.5).over_harmonic(1e-4) / 1e-5, 12)
+        0.8
+        """
+        ratio: float = energy ** (self.power / 2 - 1)
+        return 2 / self.power * ratio
+
+    def overlap_of(self, energy: float) -> float:
+        """Return the overlap of contacts of which two have this energy, in units of k_e."""
+        return math.sqrt((self.power / 2 * energy) ** (2 / self.power))
+
+    def range_of(self, name: str) -> Range:
+        """Return the allowed targets ``u0`` or ``pressure``: those of harmonic contacts, of the same overlaps."""
+        ends = (RANGES[name].low, RANGES[name].high)
+        if name == "pressure":
+            low, high = (end ** (self.power - 1) for end in ends)
+        else:
+            low, high = (end * self.over_harmonic(end) for end in ends)
+        return RANGES[name]._replace(low=low, high=high)
+
+    def overlap_over_harmonic(self, slope: float) -> float:
+        """Return the overlap of a contact over that of a harmonic one of the same slope of the energy, in units of k_e."""
+        ratio: float = max(slope, sys.float_info.min) ** (1 / (self.power - 1) - 1)
+        return ratio
+
+    def stated(self) -> dict[str, Any]:
+        """Return the constants by name, as files state them: the power only where it is not that of harmonic contacts."""
+        found = self._asdict()
+        return found if self.power != HARMONIC else {k: found[k] for k in found if k != "power"}
 
 
 class Shape(ABC):
@@ -265,8 +377,8 @@ class Shape(ABC):
         make = getattr(contact, self.compiled_name)
         if np.ndim(law.k_e):
             table = np.array(law.k_e, np.float64)
-            return make(*particles, dimension, table, species, law.sides)
-        return make(*particles, dimension, law.k_e, law.sides)
+            return make(*particles, dimension, table, species, law.sides, law.power)
+        return make(*particles, dimension, law.k_e, law.sides, law.power)
 
     def form_of_exponents(self, exponent: FloatArray) -> FloatArray:
         """Return the (N, K) form of (N,) exponents, all 1 for shapes without; the usual form, if there is one.
@@ -342,7 +454,8 @@ class Shape(ABC):
         kinds, rows = _types_of_forms(types, form)
         if rows is not None:
             types = rows
-        lines = [f"pair_style {self.style_name(law)}", *pair_coefficients(law.k_e, kinds)]
+        settings = "" if law.power == HARMONIC else f" law {law_text(law.power)}"
+        lines = [f"pair_style {self.style_name(law)}{settings}", *pair_coefficients(law.k_e, kinds)]
         for k in np.unique(types) if form.shape[1] else ():
             row = kinds[k - 1] - 1
             own = law.k_e[row][row] if isinstance(law.k_e, tuple) else law.k_e
@@ -351,7 +464,7 @@ class Shape(ABC):
         return Style(types, "\n".join(lines))
 
     def style_name(self, law: Interaction) -> str:
-        """Return the name of the pair style, with its settings."""
+        """Return the name of the pair style, with the settings that other shapes do not have."""
         del law
         return f"{self.name}/harmonic"
 

@@ -38,7 +38,7 @@ def of_packing(table: ModeTable) -> dict[str, Any]:
 
 def to_store(attributes: Mapping[str, Any], packing: Packing) -> dict[str, Any]:
     """Return the attributes that a file of modes copies from its packing: those of its file, shape and law."""
-    known = dict(attributes) | {"shape": packing.shape_style, **packing.law._asdict()}
+    known = dict(attributes) | {"shape": packing.shape_style, **packing.law.stated()}
     return {f"{PREFIX}{name}": value for name, value in known.items()}
 
 

@@ -17,6 +17,7 @@ from scipy.optimize import linprog
 
 from jamshape.arrays import BoolArray, FloatArray, IntArray
 from jamshape.landscape import Landscape, State
+from jamshape.shapes.shape import HARMONIC
 from jamshape.vibration.hessian import (
     DynamicalMatrix,
     DynamicalMatrixOptions,
@@ -248,5 +249,7 @@ def _named(contacts: dict[str, FloatArray]) -> list[tuple[int, ...]]:
 
 def _larger(landscape: Landscape, swelling: float) -> Landscape:
     particles = landscape.particles
-    larger = particles.with_(diameters=(1 + swelling) * particles.diameters)
+    # Of harmonic bonds, the overlap is the force over the stiffness.
+    law = particles.law.but(power=HARMONIC)
+    larger = particles.with_(diameters=(1 + swelling) * particles.diameters, law=law)
     return Landscape(larger, landscape.k_e, landscape.sides)

@@ -33,7 +33,7 @@ def test_a_file_has_the_energy_of_its_packing_under_its_own_law(packing, tmp_pat
         js.save(tmp_path / f"rods.{end}", own)
         for path in (tmp_path / f"rods.{end}", str(tmp_path / f"rods.{end}")):
             found = js.energy(path)
-            assert pytest.approx(forces(packing, *SOFT).energy, rel=1e-12) == found.U
+            assert pytest.approx(forces(packing, SOFT.k_e, SOFT.sides).energy, rel=1e-12) == found.U
             assert pytest.approx(forces(packing).energy, rel=1e-3) != found.U
     js.modes(packing).save(tmp_path / "modes.h5")
     with pytest.raises(ValueError, match=r"modes.h5 holds modes, expected particles"):
