@@ -222,7 +222,6 @@ struct SpheropolygonModel {
   {
     return {bond, sides, shortcuts};
   }
-  static double k_e(const Law &law) { return law.harmonic.k_e; }
 
   static std::optional<Shape> shape_from(const Vec<3> &semi_axes, const Form &form)
   {

@@ -72,7 +72,7 @@ def main(_: Namespace) -> int:
 
 
 def here() -> list[Found]:
-    """This machine, this Python and the compiled module."""
+    """Describe the machine, its Python and the compiled module."""
     system = f"{platform.system()} {platform.release()} on {platform.machine()}, {cores()} cores"
     found = [
         Found("jamshape", metadata.version("jamshape")),
@@ -89,10 +89,8 @@ def here() -> list[Found]:
 
 
 def packages() -> list[Found]:
-    """Python packages, needed and optional ones."""
-    found = [
-        Found(name, _version(name), f"pip install {name}", is_needed=True) for name in NEEDED
-    ]
+    """List Python packages, needed and optional ones."""
+    found = [Found(name, _version(name), f"pip install {name}", is_needed=True) for name in NEEDED]
     found += [
         Found(name, _version(name), f"for {use}: pip install {name}")
         for name, use in OPTIONAL.items()
@@ -101,7 +99,7 @@ def packages() -> list[Found]:
 
 
 def lammps() -> list[Found]:
-    """The plugin, and the LAMMPS that loads it."""
+    """Find the plugin, and the LAMMPS that loads it."""
     try:
         path, version = plugin_path(), built_for()
     except PluginError as error:
@@ -119,7 +117,7 @@ def lammps() -> list[Found]:
 
 
 def programs() -> list[Found]:
-    """Programs in PATH."""
+    """Look for programs in PATH."""
     return [
         Found(name, shutil.which(name), f"for {use}: install {name}")
         for name, use in PROGRAMS.items()

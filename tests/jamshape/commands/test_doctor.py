@@ -20,7 +20,8 @@ def test_all_that_is_needed_works_here(jamshape):
 
 def test_what_is_missing_comes_with_advice(jamshape, monkeypatch):
     def no_plugin():
-        raise PluginError("Found no LAMMPS plugin, expected one: install LAMMPS.")
+        msg = "Found no LAMMPS plugin, expected one: install LAMMPS."
+        raise PluginError(msg)
 
     known = metadata.version
     monkeypatch.setattr(doctor, "plugin_path", no_plugin)

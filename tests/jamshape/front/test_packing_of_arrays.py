@@ -110,7 +110,10 @@ def test_round_particles_need_no_orientation(dimension):
         ({"id": [1, 1]}, "an id occurs more than once"),
         ({"species": [0, 1]}, "species holds 0, expected numbers from 1"),
         ({"image": [[0, 0]]}, r"image has shape \(1, 2\), expected \(2, 2\)"),
-        ({"k_e": -1.0}, r"law is Interaction\(k_e=-1.0, sides=2, power=2.0\), expected .* a positive k_e"),
+        (
+            {"k_e": -1.0},
+            r"law is Interaction\(k_e=-1.0, sides=2, power=2.0\), expected .* a positive k_e",
+        ),
         ({"k_e": "stiff"}, "k_e is 'stiff', expected a positive number"),
         ({"sides": 3}, r"law is .*sides=3, power=2.0\), expected .* sides 1 or 2"),
     ],
