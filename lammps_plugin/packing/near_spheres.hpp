@@ -28,7 +28,7 @@ template <int D> class NearSpheres {
  public:
   /// Centres (N, D), radii (N,), and cell vectors (D, D) as columns, upper triangular.
   NearSpheres(const double *centre, const std::vector<double> &radius, const double *cell_vectors) :
-      cell(cell_vectors), spheres(radius.size())
+      cell(cell_vectors), spheres(radius.size()), places(radius.size())
   {
     for (const double r : radius) largest = std::max(largest, WIDER * r);
     for (int k = 0; k < D; ++k) invert(k);
@@ -72,20 +72,24 @@ template <int D> class NearSpheres {
   static constexpr double FARTHEST = 1e15;
 
   struct Sphere {
-    Vec<D> centre, fraction;  // in the box
+    Vec<D> centre;  // in the box
     double radius;
     std::int64_t number;
+  };
+  struct Place {
+    Vec<D> fraction;
     std::array<std::int64_t, D> turns;  // cell vectors subtracted
   };
   using Neighbour = std::pair<std::int64_t, std::array<std::int64_t, D>>;  // and its shift
 
   const double *cell;
   std::vector<Sphere> spheres;
+  std::vector<Place> places;
   std::array<std::array<double, D>, D> inverse{};  // of the cell vectors
   Vec<D> width;                                    // over a length, in units of each vector
   std::array<long, D> count;
-  std::vector<std::size_t> first;      // of each cell, in `sorted`
-  std::vector<const Sphere *> sorted;  // by cells, in each by number
+  std::vector<std::size_t> first;  // of each cell, in `sorted`
+  std::vector<Sphere> sorted;      // by cells, in each by number
   double largest = 0.0;
 
   /// Finds a row of the inverse, upper triangular like the matrix.
@@ -113,6 +117,7 @@ template <int D> class NearSpheres {
   void wrap(const double *centre, double radius, std::size_t i)
   {
     Sphere &sphere = spheres[i];
+    Place &place = places[i];
     sphere.radius = radius;
     sphere.number = static_cast<std::int64_t>(i);
     for (int k = 0; k < D; ++k) {
@@ -123,13 +128,13 @@ template <int D> class NearSpheres {
         throw std::invalid_argument("a particle is more than 1e15 cell vectors away from the box, "
                                     "expected positions near it.");
       }
-      sphere.turns[k] = static_cast<std::int64_t>(turns);
-      sphere.fraction[k] = at - turns;
+      place.turns[k] = static_cast<std::int64_t>(turns);
+      place.fraction[k] = at - turns;
     }
     for (int k = 0; k < D; ++k) {
       sphere.centre[k] = centre[k];
       for (int m = k; m < D; ++m) {
-        sphere.centre[k] -= cell[D * k + m] * static_cast<double>(sphere.turns[m]);
+        sphere.centre[k] -= cell[D * k + m] * static_cast<double>(place.turns[m]);
       }
     }
   }
@@ -140,10 +145,10 @@ template <int D> class NearSpheres {
     first.assign(n_cells + 1, 0);
     std::vector<std::size_t> own;
     own.reserve(spheres.size());
-    for (const Sphere &sphere : spheres) {
+    for (const Place &place : places) {
       std::size_t at = 0;
       for (int k = 0; k < D; ++k) {
-        const long along = static_cast<long>(sphere.fraction[k] * static_cast<double>(count[k]));
+        const long along = static_cast<long>(place.fraction[k] * static_cast<double>(count[k]));
         at = at * count[k] + std::min(along, count[k] - 1);
       }
       own.push_back(at);
@@ -152,7 +157,7 @@ template <int D> class NearSpheres {
     for (std::size_t c = 0; c < n_cells; ++c) first[c + 1] += first[c];
     sorted.resize(spheres.size());
     std::vector<std::size_t> next(first.begin(), first.end() - 1);
-    for (std::size_t i = 0; i < spheres.size(); ++i) sorted[next[own[i]]++] = &spheres[i];
+    for (std::size_t i = 0; i < spheres.size(); ++i) sorted[next[own[i]]++] = spheres[i];
   }
 
   /// Visits the images of cells that a sphere may reach, along one cell vector after another.
@@ -161,9 +166,9 @@ template <int D> class NearSpheres {
   {
     if (k == D) return visit(sphere, own, image, near);
     const double reach = (sphere.radius + largest) * width[k] + ROUNDING;
-    const double per_cell = static_cast<double>(count[k]);
-    const long from = static_cast<long>(std::floor((sphere.fraction[k] - reach) * per_cell));
-    const long to = static_cast<long>(std::floor((sphere.fraction[k] + reach) * per_cell));
+    const double per_cell = static_cast<double>(count[k]), at = places[sphere.number].fraction[k];
+    const long from = static_cast<long>(std::floor((at - reach) * per_cell));
+    const long to = static_cast<long>(std::floor((at + reach) * per_cell));
     for (long c = from; c <= to; ++c) {
       const long turns = c >= 0 ? c / count[k] : -((count[k] - 1 - c) / count[k]);
       image[k] = static_cast<double>(turns);
@@ -181,13 +186,14 @@ template <int D> class NearSpheres {
       for (int m = k; m < D; ++m) from[k] -= cell[D * k + m] * image[m];
     }
     for (std::size_t at = first[own + 1]; at-- > first[own];) {
-      const Sphere &other = *sorted[at];
+      const Sphere &other = sorted[at];
       if (other.number < sphere.number) return;
       const double reach = sphere.radius + other.radius;
       if (!(norm_sq(from - other.centre) < reach * reach)) continue;
       Neighbour found{other.number, {}};
       for (int k = 0; k < D; ++k) {
-        found.second[k] = static_cast<std::int64_t>(image[k]) + sphere.turns[k] - other.turns[k];
+        found.second[k] = static_cast<std::int64_t>(image[k]) + places[sphere.number].turns[k] -
+                          places[other.number].turns[k];
       }
       if (other.number > sphere.number || is_leading(found.second)) near.push_back(found);
     }
