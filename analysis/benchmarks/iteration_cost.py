@@ -186,8 +186,8 @@ def of_iteration(packing: Packing, state: State) -> float:
     )  # fmt: skip
     times = []
     for _ in range(5):
-        local_model = LocalEnergyModel(landscape, state)
         began, before = time.process_time(), landscape.evaluations
+        local_model = LocalEnergyModel(landscape, state)
         local_model.descend(stop, 1e-6)
         done = landscape.evaluations - before
         times.append((time.process_time() - began) / done)

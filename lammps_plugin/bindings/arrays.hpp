@@ -125,21 +125,28 @@ inline void require_edges(const double *edges, std::size_t D)
           "edges hold a number that is not a positive length.");
 }
 
-/// Throws unless (2, D, D), double-doubles, are an upper triangular matrix with a positive
-/// diagonal.
+/// Throws unless (D, D) are an upper triangular matrix, with a positive diagonal or, as of low
+/// parts, any.
+inline void require_upper(const double *of, std::size_t D, const std::string &name,
+                          bool positive = true)
+{
+  require_finite(of, D * D, name.c_str());
+  for (std::size_t k = 0; k < D; ++k) {
+    const double *const row = of + k * D;
+    require(std::all_of(row, row + k, [](double x) { return x == 0.0; }),
+            name + " is not upper triangular, expected vectors as columns, the first along x.");
+    require(!positive || row[k] > 0.0, name + " has an edge that is not a positive length.");
+  }
+}
+
+/// Throws unless (2, D, D), double-doubles, are such a matrix.
 inline void require_upper(const Array3<double> &of, std::size_t D, const std::string &name)
 {
   require(of.shape(0) == 2 && of.shape(1) == D && of.shape(2) == D,
           name + " does not have the shape (2, D, D).");
   require_finite(of, name.c_str());
-  for (std::size_t part = 0; part < 2; ++part) {
-    for (std::size_t k = 0; k < D; ++k) {
-      const double *const row = of.data() + (part * D + k) * D;
-      require(std::all_of(row, row + k, [](double x) { return x == 0.0; }),
-              name + " is not upper triangular, expected vectors as columns, the first along x.");
-      require(part == 1 || row[k] > 0.0, name + " has an edge that is not a positive length.");
-    }
-  }
+  require_upper(of.data(), D, name);
+  require_upper(of.data() + D * D, D, name, false);
 }
 
 /// Throws unless (2, D, D) are the cell vectors of a box, as columns.

@@ -28,12 +28,11 @@ nb::object tuple_of(const DescentRow &row)
 }
 
 DescentEnd descend(LocalEnergyModel &of, const DescentStop &stop, double shift,
-                   const nb::callable &renew, const nb::callable &tell)
+                   const nb::callable &tell)
 {
   require_base(of);
   require(shift > 0.0 && std::isfinite(shift), "the shift is not a positive number.");
   Descent descent(of, stop, shift);
-  descent.renew = renewing(of, renew);
   descent.tell = [&](const DescentRow &row) { tell(tuple_of(row)); };
   return descent.run();
 }
@@ -59,7 +58,8 @@ class PosedNewton {
   void prepare()
   {
     require_base(about);
-    require(about.has_pairs(), "there are no pairs yet, expected take_pairs before.");
+    const Eigen::VectorXd origin = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(about.n()));
+    about.renew_pairs({origin.data(), 0.0});
     system.prepare();
     is_prepared = true;
   }
@@ -133,12 +133,11 @@ void export_descent(nb::module_ &m)
   nb::borrow<nb::class_<LocalEnergyModel>>(nb::type<LocalEnergyModel>())
       .def("part_within", &part_within, "x"_a, "longest_step"_a, "widest_turn"_a,
            "The fraction of a step (n,), at most 1, that keeps every particle within these bounds.")
-      .def("descend", &descend, "stop"_a, "shift"_a, "renew"_a, "tell"_a,
+      .def("descend", &descend, "stop"_a, "shift"_a, "tell"_a,
            "Minimise the energy at fixed box by L-BFGS and Newton's method, with this initial "
            "shift\n"
-           "of the Hessian; the base moves along. renew(x, strain) takes pairs that hold there;\n"
-           "tell(row) is called from time to time with (seconds, evaluations, residual, energy\n"
-           "density). Returns a DescentEnd.");
+           "of the Hessian; the base moves along. tell(row) is called from time to time with\n"
+           "(seconds, evaluations, residual, energy density). Returns a DescentEnd.");
 }
 
 }  // namespace jamshape

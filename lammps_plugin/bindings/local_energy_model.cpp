@@ -13,26 +13,19 @@ namespace jamshape {
 
 namespace {
 
-/// Poses as double-doubles.
-struct PoseArrays {
-  const Array3<double> &position;     // (2, N, D)
-  const Array3<double> &orientation;  // (2, N, 1) or (2, N, 4)
-  const Array3<double> &cell;         // (2, D, D)
-
-  Poses read() const
-  {
-    Poses poses;
-    const auto fill = [](Poses::Numbers &to, const auto &from) {
-      for (std::size_t part = 0, n = from.size() / 2; part < 2; ++part) {
-        to[part].assign(from.data() + part * n, from.data() + (part + 1) * n);
-      }
-    };
-    fill(poses.position, position);
-    fill(poses.orientation, orientation);
-    fill(poses.cell, cell);
-    return poses;
-  }
-};
+Poses poses_from(const PoseArrays &arrays)
+{
+  Poses poses;
+  const auto fill = [](Poses::Numbers &to, const auto &from) {
+    for (std::size_t part = 0, n = from.size() / 2; part < 2; ++part) {
+      to[part].assign(from.data() + part * n, from.data() + (part + 1) * n);
+    }
+  };
+  fill(poses.position, arrays.position);
+  fill(poses.orientation, arrays.orientation);
+  fill(poses.cell, arrays.cell);
+  return poses;
+}
 
 /// Description of the coordinates, as Python passes it.
 struct CoordinateArrays {
@@ -73,35 +66,6 @@ struct CoordinateArrays {
   }
 };
 
-void check_poses(const PoseArrays &poses, const LocalEnergyModel &about)
-{
-  const std::size_t N = about.n_particles(), D = about.dimension();
-  const auto has_shape = [&](const Array3<double> &of, std::size_t columns) {
-    return of.shape(0) == 2 && of.shape(1) == N && of.shape(2) == columns;
-  };
-  require(has_shape(poses.position, D) && has_shape(poses.orientation, D == 2 ? 1 : 4),
-          D == 2 ? "position and orientation do not have shapes (2, N, 2) and (2, N, 1)."
-                 : "position and orientation do not have shapes (2, N, 3) and (2, N, 4).");
-  require_finite(poses.position, "position");
-  require_orientations(poses.orientation.data(), N, D);
-  require_cell(poses.cell, D);
-}
-
-void take(LocalEnergyModel &of, const Array2<std::int64_t> &pairs,
-          const Array2<std::int64_t> &shift, const PoseArrays &then, const Vec<3> &hold)
-{
-  check_poses(then, of);
-  require_base(of);
-  require_pairs(pairs, shift, of.dimension(), of.n_particles());
-  require_finite(hold.c, 3, "wide, reach and skin");
-  of.take({{pairs.data(), pairs.data() + pairs.size()},
-           {shift.data(), shift.data() + shift.size()},
-           then.read(),
-           hold[0],
-           hold[1]},
-          hold[2]);
-}
-
 Displacement checked(const LocalEnergyModel &of, const Array1<double> &x, double strain)
 {
   require(x.shape(0) == of.n(), "x has " + std::to_string(x.shape(0)) +
@@ -116,15 +80,17 @@ Displacement checked(const LocalEnergyModel &of, const Array1<double> &x, double
 nb::object evaluate(LocalEnergyModel &of, const Array1<double> &x, double strain, bool extended)
 {
   const Displacement at = checked(of, x, strain);
-  return of.holds(at) ? tuple_of(of.evaluate(at, extended)) : nb::none();
+  of.renew_pairs(at);
+  return tuple_of(of.evaluate(at, extended));
 }
 
 std::shared_ptr<Factors> factorise(LocalEnergyModel &of, const Array1<double> &x, double strain,
                                    const Array1<double> &diagonal)
 {
   require(diagonal.shape(0) == of.n(), "diagonal does not have one number per coordinate.");
-  require(of.has_pairs(), "there are no pairs yet, expected take_pairs before.");
-  const auto found = of.factorise(checked(of, x, strain), vector(diagonal));
+  const Displacement at = checked(of, x, strain);
+  of.renew_pairs(at);
+  const auto found = of.factorise(at, vector(diagonal));
   require(found != nullptr, "the Hessian has elements that are not finite.");
   return found;
 }
@@ -133,8 +99,8 @@ void move_to(LocalEnergyModel &of, const Array3<double> &position,
              const Array3<double> &orientation, const Array3<double> &cell)
 {
   const PoseArrays poses{position, orientation, cell};
-  check_poses(poses, of);
-  of.move_to(poses.read());
+  poses.check(of.n_particles(), of.dimension());
+  of.move_to(poses_from(poses));
 }
 
 void hold(LocalEnergyModel &of)
@@ -196,9 +162,9 @@ nb::object solve(const Factors &factors, const Array2<double> &right)
 /// Kept as a separate function: compilers limit inlining by the size of a function.
 template <class Model, int D>
 [[gnu::noinline]] std::unique_ptr<LocalEnergyModel> local_model_of(const ShapeOf<Model> &of,
-                                                                   Coordinates names)
+                                                                   Coordinates names, double skin)
 {
-  return std::make_unique<VicinityOf<Model, D>>(of.shapes(), std::move(names), of.laws());
+  return std::make_unique<VicinityOf<Model, D>>(of.shapes(), std::move(names), of.laws(), skin);
 }
 
 /// Gives each shape's class a method that makes the energy of its particles.
@@ -210,15 +176,18 @@ void export_constructors()
     class_of<Model>().def(
         "local_energy_model",
         [](const ShapeOf<Model> &of, const Array2<std::int64_t> &column,
-           const Array1<double> &rotation_length, const Array1<double> &turning_radius) {
+           const Array1<double> &rotation_length, const Array1<double> &turning_radius,
+           double skin) {
+          require(skin > 0.0 && std::isfinite(skin),
+                  "skin is " + shown(skin) + ", expected a positive length.");
           const CoordinateArrays names{column, rotation_length, turning_radius};
           return of.in_space(
-              [&](auto D) { return local_model_of<Model, D>(of, names.read(of.n(), D)); });
+              [&](auto D) { return local_model_of<Model, D>(of, names.read(of.n(), D), skin); });
         },
-        "column"_a, "rotation_length"_a, "turning_radius"_a,
+        "column"_a, "rotation_length"_a, "turning_radius"_a, "skin"_a,
         "The energy about a base; column (N, 3), in space (N, 6), numbers of the coordinates\n"
-        "displacement, rotation, or -1. First of all, move_to a base; evaluate returns None if it\n"
-        "needs pairs.");
+        "displacement, rotation, or -1; pairs of surfaces closer than a skin are listed. First of\n"
+        "all, move_to a base.");
   });
 }
 
@@ -276,24 +245,14 @@ void export_local_energy_model(nb::module_ &m)
            "space, and factors solve equations, by iteration where they are incomplete.")
       .def("evaluate", &evaluate, "x"_a, "strain"_a, "extended"_a,
            "Return energy, gradient (n,), derivative with respect to the strain, sum of the\n"
-           "magnitudes of bond forces, number of bonds, the index of a pair that crosses and of\n"
-           "one that is unconverged, or -1, and the virial (D D,); None if the pairs no longer "
-           "hold.")
+           "magnitudes of bond forces, number of bonds, particles (k, 2) of a pair that crosses "
+           "and\n"
+           "of one that is unconverged, with k 0 or 1, and the virial (D D,).")
       .def("factorise", &factorise, "x"_a, "strain"_a, "diagonal"_a,
            "Factors of the Hessian in these coordinates plus a diagonal (n,), shifted if it is\n"
            "not positive definite.")
-      .def(
-          "take_pairs",
-          [](LocalEnergyModel &of, const Array3<double> &position,
-             const Array3<double> &orientation, const Array3<double> &cell,
-             const Array2<std::int64_t> &pairs, const Array2<std::int64_t> &shift, double wide,
-             double reach, double skin) {
-            take(of, pairs, shift, {position, orientation, cell}, {{wide, reach, skin}});
-          },
-          "position"_a, "orientation"_a, "cell"_a, "pairs"_a, "shift"_a, "wide"_a, "reach"_a,
-          "skin"_a,
-          "Take all pairs of surfaces closer than a wide skin at these poses, and of centres\n"
-          "closer than reach; those within skin are chosen among them as particles move.");
+      .def("forget_pairs", &LocalEnergyModel::forget_pairs,
+           "Forget all pairs, so that results depend on the base alone, to the last bit.");
 
   export_strains();
   export_constructors();

@@ -4,6 +4,8 @@
 #include "landscape/local_energy_model.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cstdint>
 
 namespace jamshape {
 
@@ -19,17 +21,20 @@ inline Eigen::Map<const Eigen::VectorXd> vector(const Array1<double> &of)
   return {of.data(), static_cast<Eigen::Index>(of.shape(0))};
 }
 
+/// Rows (k, 2) of the pairs that exist, one or none.
+inline nb::object rows_of(const std::array<std::int64_t, 2> &particles)
+{
+  NewArray<std::int64_t> rows({particles[0] < 0 ? std::size_t{0} : std::size_t{1}, 2});
+  if (particles[0] >= 0) std::copy_n(particles.data(), 2, rows.row(0));
+  return rows.release();
+}
+
 inline nb::object tuple_of(const LandscapeSums &sums)
 {
   return nb::make_tuple(sums.energy, array_of(sums.gradient.data(), sums.gradient.size()),
-                        sums.strain_gradient, sums.bond_force, sums.n_bonds, sums.crossing,
-                        sums.unconverged, array_of(sums.virial.data(), sums.virial.size()));
-}
-
-/// Callback that gives a local energy model new pairs: a Python function of x and the strain.
-inline auto renewing(const LocalEnergyModel &of, const nb::callable &renew)
-{
-  return [&of, renew](const Displacement &at) { renew(array_of(at.x, of.n()), at.strain); };
+                        sums.strain_gradient, sums.bond_force, sums.n_bonds, rows_of(sums.crossing),
+                        rows_of(sums.unconverged),
+                        array_of(sums.virial.data(), sums.virial.size()));
 }
 
 inline void require_base(const LocalEnergyModel &of)

@@ -20,13 +20,11 @@ inline void require_pairs(const Array2<std::int64_t> &pairs, const Array2<std::i
           "a pair names a particle that does not exist.");
 }
 
-/// Poses of particles and some of their pairs, as they come from Python.
-struct PairArrays {
+/// Poses of particles as double-doubles, as they come from Python.
+struct PoseArrays {
   const Array3<double> &position;     // (2, N, D)
   const Array3<double> &orientation;  // (2, N, 1) or (2, N, 4)
   const Array3<double> &cell;         // (2, D, D)
-  const Array2<std::int64_t> &pairs;  // (M, 2)
-  const Array2<std::int64_t> &shift;  // (M, D)
 
   [[gnu::noinline]] void check(std::size_t N, std::size_t D) const
   {
@@ -39,7 +37,6 @@ struct PairArrays {
     require_finite(orientation, "orientation");
     require_orientations(orientation.data(), N, D);
     require_cell(cell, D);
-    require_pairs(pairs, shift, D, N);
   }
 
   SplitPoses poses() const
@@ -48,6 +45,18 @@ struct PairArrays {
       return SplitPoses::View{of.data(), of.data() + of.size() / 2};
     };
     return {parts(position), parts(orientation), parts(cell)};
+  }
+};
+
+/// Poses of particles and some of their pairs.
+struct PairArrays : PoseArrays {
+  const Array2<std::int64_t> &pairs;  // (M, 2)
+  const Array2<std::int64_t> &shift;  // (M, D)
+
+  void check(std::size_t N, std::size_t D) const
+  {
+    PoseArrays::check(N, D);
+    require_pairs(pairs, shift, D, N);
   }
 
   PairList list() const { return {pairs.shape(0), pairs.data(), shift.data()}; }

@@ -173,7 +173,7 @@ void def_over_pairs(nb::class_<ShapeOf<Model>> of, const char *name, const Funct
                  const Array3<double> &orientation, const Array3<double> &cell,
                  const Array2<std::int64_t> &pairs, const Array2<std::int64_t> &shift,
                  More... more) {
-        return function(self, PairArrays{position, orientation, cell, pairs, shift}, more...);
+        return function(self, PairArrays{{position, orientation, cell}, pairs, shift}, more...);
       },
       "position"_a, "orientation"_a, "cell"_a, "pairs"_a, "shift"_a, extra...);
 }

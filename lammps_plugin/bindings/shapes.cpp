@@ -5,6 +5,7 @@
 
 #include "bindings/contact_arrays.hpp"
 #include "bindings/shape.hpp"
+#include "packing/near_particles.hpp"
 
 #include <cmath>
 #include <optional>
@@ -163,10 +164,49 @@ template <class Model, int D, class S>
   return result;
 }
 
+nb::tuple tuple_of(const ListedPairs &pairs, std::size_t D)
+{
+  NewArray<std::int64_t> particles({pairs.size(), 2}), shift({pairs.size(), D});
+  std::copy(pairs.particles.begin(), pairs.particles.end(), particles.row(0));
+  std::copy(pairs.shift.begin(), pairs.shift.end(), shift.row(0));
+  return nb::make_tuple(particles.release(), shift.release());
+}
+
+nb::tuple near_spheres(const Array2<double> &centre, const Array1<double> &radius,
+                       const Array2<double> &cell)
+{
+  const std::size_t n = centre.shape(0), space = centre.shape(1);
+  require((space == 2 || space == 3) && radius.shape(0) == n && cell.shape(0) == space &&
+              cell.shape(1) == space,
+          "centre, radius and cell do not have shapes (N, D), (N,) and (D, D).");
+  require_finite(centre, "centre");
+  require_finite(radius, "radius");
+  require_upper(cell.data(), space, "cell");
+  return in_dimension(static_cast<int>(space), [&](auto D) {
+    const std::vector<double> radii(radius.data(), radius.data() + n);
+    return tuple_of(NearSpheres<D>(centre.data(), radii, cell.data()).find(), D);
+  });
+}
+
 template <class Model> void export_pairs(nb::class_<ShapeOf<Model>> &of)
 {
   using namespace nb::literals;
   using Self = const ShapeOf<Model> &;
+  of.def(
+      "near_particles",
+      [](Self self, const Array3<double> &position, const Array3<double> &orientation,
+         const Array3<double> &cell, double margin) {
+        const PoseArrays arrays{position, orientation, cell};
+        require_finite(margin, "margin");
+        return self.in_space([&](auto D) {
+          arrays.check(self.n(), D);
+          return tuple_of(
+              near_particles<Model, D>(self.shapes(), self.laws(), arrays.poses(), margin), D);
+        });
+      },
+      "position"_a, "orientation"_a, "cell"_a, "margin"_a,
+      "Pairs (M, 2) of particles whose surfaces may be closer than `margin`, with all images, and\n"
+      "cell vectors (M, D) to add to the second, in ascending order.");
   def_over_pairs<double>(
       of, "near",
       [](Self self, const PairArrays &arrays, double margin) {
@@ -248,6 +288,12 @@ template <class Model> void export_shape(nb::module_ &m)
 
 void export_shapes(nb::module_ &m)
 {
+  using namespace nb::literals;
+  m.def(
+      "near_spheres", &near_spheres, "centre"_a, "radius"_a, "cell"_a,
+      "Pairs (M, 2) of overlapping spheres of centres (N, D) and radii (N,), with all periodic\n"
+      "images in the box of these cell vectors (D, D), as columns, and cell vectors (M, D) to add\n"
+      "to the second, in ascending order.");
   Shapes::each([&](auto model) { export_shape<decltype(model)>(m); });
 }
 

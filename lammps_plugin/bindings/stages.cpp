@@ -27,7 +27,7 @@ struct StageKinks {
 
 StageEnd solve_stage(LocalEnergyModel &of, const PosedStage &stage,
                      const std::shared_ptr<Factors> &factors, std::size_t n_bonds,
-                     const nb::callable &renew, const StageKinks &kinks)
+                     const StageKinks &kinks)
 {
   for (const auto *part :
        {&stage.equation.drag, &stage.equation.centre, &stage.guess, &stage.other}) {
@@ -37,7 +37,7 @@ StageEnd solve_stage(LocalEnergyModel &of, const PosedStage &stage,
   }
   require_base(of);
   require(!factors || factors->size() == of.n(), "the factors have another number of coordinates.");
-  return StageSolver(of, stage.equation, stage.units, stage.limits, renewing(of, renew))
+  return StageSolver(of, stage.equation, stage.units, stage.limits)
       .solve(stage.guess, stage.other, {factors, n_bonds, kinks.all});
 }
 
@@ -125,12 +125,10 @@ void export_stages(nb::module_ &m)
       .def_ro("directions", &StageEnd::directions)
       .def_ro("solved", &StageEnd::solved);
   nb::borrow<nb::class_<LocalEnergyModel>>(nb::type<LocalEnergyModel>())
-      .def(
-          "solve_stage", &solve_stage, "stage"_a, "factors"_a.none(), "bonds_of_factors"_a,
-          "renew"_a, "kinks"_a = StageKinks{},
-          "Solve a Stage, with factors of an earlier one, the number of bonds at the point of\n"
-          "their Hessian, and the kinks on which it ended; renew(x, strain) takes pairs that hold\n"
-          "there. Returns a StageEnd.");
+      .def("solve_stage", &solve_stage, "stage"_a, "factors"_a.none(), "bonds_of_factors"_a,
+           "kinks"_a = StageKinks{},
+           "Solve a Stage, with factors of an earlier one, the number of bonds at the point of\n"
+           "their Hessian, and the kinks on which it ended. Returns a StageEnd.");
 }
 
 }  // namespace jamshape

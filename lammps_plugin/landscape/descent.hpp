@@ -90,8 +90,6 @@ class Bracket {
 class Descent {
  public:
   using Vector = Eigen::VectorXd;
-  /// Gives the local energy model pairs, some of which hold at a displacement.
-  using Renew = std::function<void(const Displacement &)>;
   /// Receives progress reports; may throw to stop.
   using Tell = std::function<void(const DescentRow &)>;
 
@@ -101,7 +99,6 @@ class Descent {
   {
   }
 
-  Renew renew;
   Tell tell;
 
   DescentEnd run()
@@ -326,10 +323,7 @@ class Descent {
   LandscapeSums evaluate(const Vector &x)
   {
     const Displacement at{x.data(), 0.0};
-    if (!about.holds(at)) {
-      renew(at);
-      about.holds(at);
-    }
+    about.renew_pairs(at);
     ++evaluations;
     LandscapeSums sums = about.evaluate(at, extended);
     if (!extended && !sums.is_refused() && needs_more_digits(sums)) {

@@ -4,6 +4,7 @@
 
 #include "landscape/block_system.hpp"
 #include "landscape/near_pairs.hpp"
+#include "packing/near_particles.hpp"
 #include "packing/pair_sum.hpp"
 
 #include <algorithm>
@@ -89,22 +90,23 @@ struct StepBounds {
   double longest, widest;
 };
 
-/// Energy at a point and its derivatives. A pair that crosses or is unconverged, else -1,
-/// invalidates it.
+/// Energy at a point and its derivatives. Two particles, else -1, that cross or whose contact is
+/// unconverged invalidate it.
 struct LandscapeSums {
   double energy;
   Eigen::VectorXd gradient;  // (n,), positions taken at the strained point
   double strain_gradient, bond_force;
   std::size_t n_bonds;
-  std::int64_t crossing, unconverged;
+  std::array<std::int64_t, 2> crossing, unconverged;
   std::vector<double> virial;  // (D, D) sum of r (x) force, with the trace -strain_gradient
 
-  bool is_refused() const { return crossing >= 0 || unconverged >= 0; }
+  bool crosses() const { return crossing[0] >= 0; }
+  bool is_refused() const { return crosses() || unconverged[0] >= 0; }
 };
 
-/// Energy of a packing and its derivatives as functions of n coordinates about a base, valid as
-/// long as a list of pairs holds: the interface of integrators and minimisers, which evaluate it
-/// thousands of times, for any shape. First of all, `move_to` a base and `take` pairs.
+/// Energy of a packing and its derivatives as functions of n coordinates about a base: the
+/// interface of integrators and minimisers, which evaluate it thousands of times, for any shape.
+/// First of all, `move_to` a base; then each point is one that pairs are renewed for.
 class LocalEnergyModel {
  public:
   virtual ~LocalEnergyModel() = default;
@@ -112,7 +114,6 @@ class LocalEnergyModel {
   virtual std::size_t n() const = 0;
   virtual std::size_t n_particles() const = 0;
   virtual bool has_base() const = 0;
-  virtual bool has_pairs() const = 0;
   virtual const Poses &poses() const = 0;
 
   /// Sets the base of the coordinates.
@@ -126,11 +127,10 @@ class LocalEnergyModel {
   /// positions and cell vectors, and rotation vectors (N, 1 or 3) rotate the particles that can
   /// rotate.
   virtual void deform(const std::vector<long double> &matrix, const double *turns) = 0;
-  /// Takes pairs of a wide skin, from which those within a smaller one are chosen repeatedly.
-  virtual void take(NearPairs wider, double smaller_skin) = 0;
-  /// Whether the present pairs hold at a point, chosen anew if necessary; if not, new ones must be
-  /// taken before any evaluation there.
-  virtual bool holds(const Displacement &at) = 0;
+  /// Renews the pairs if any that may touch at a point could be missing, before all else there.
+  virtual void renew_pairs(const Displacement &at) = 0;
+  /// Forgets all pairs, so that results depend on the base alone, to the last bit.
+  virtual void forget_pairs() = 0;
 
   /// Whether contacts start from those of the previous point from now on, so that the last bits of
   /// results depend on the points before; for points that follow one another.
@@ -212,17 +212,21 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   using Shape = typename Model::Shape;
   using Law = typename Model::Law;
 
-  VicinityOf(std::vector<Shape> particle_shapes, Coordinates names, Laws<Law> contact_laws) :
-      shapes(std::move(particle_shapes)), coordinates(std::move(names)),
+  /// `skin_of_pairs` is the distance of surfaces within which pairs are listed.
+  VicinityOf(std::vector<Shape> particle_shapes, Coordinates names, Laws<Law> contact_laws,
+             double skin_of_pairs) :
+      shapes(std::move(particle_shapes)), coordinates(std::move(names)), skin(skin_of_pairs),
       laws(std::move(contact_laws))
   {
+    for (const Shape &shape : shapes) {
+      reach = std::max(reach, 2.0 * Model::template outer_radius<D>(shape));
+    }
   }
 
   int dimension() const override { return D; }
   std::size_t n() const override { return coordinates.n; }
   std::size_t n_particles() const override { return shapes.size(); }
   bool has_base() const override { return base.position[0].size() == D * shapes.size(); }
-  bool has_pairs() const override { return !pairs.moved.empty(); }
   const Poses &poses() const override { return base; }
 
   void move_to(const Poses &poses) override
@@ -255,25 +259,21 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     if (has_pairs()) measure_pairs();
   }
 
-  void take(NearPairs wider, double smaller_skin) override
+  void renew_pairs(const Displacement &at) override
   {
-    wide = std::move(wider);
-    skin = smaller_skin;
-    choose({std::vector<double>(n()).data(), 0.0});
+    if (!has_pairs()) {
+      const std::vector<double> origin(n());
+      find({origin.data(), 0.0});
+      choose({origin.data(), 0.0});
+    }
+    if (!is_beyond(pairs, at)) return;
+    // Chosen at the same points whenever the wide ones were found: factors depend on the choice.
+    measure(wide);
+    if (is_beyond(wide, at, skin)) find(at);
+    choose(at);
   }
 
-  bool holds(const Displacement &at) override
-  {
-    if (!has_pairs()) return false;
-    if (!is_outrun && !is_beyond(pairs, at)) return true;
-    const Eigen::Map<const Eigen::VectorXd> x(at.x, static_cast<Eigen::Index>(n()));
-    // Chosen at the same points whenever the wide ones were taken: factors depend on the choice.
-    measure(wide);
-    is_outrun = is_beyond(wide, at, skin) || !x.allFinite();
-    if (is_outrun) return false;
-    choose(at);
-    return true;
-  }
+  void forget_pairs() override { moved.reset(); }
 
   void remember(bool contacts) override
   {
@@ -444,6 +444,9 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   /// than the iterations that avoid it.
   static constexpr std::size_t FEW = 150;
 
+  /// Skin of the pairs from which those within the smaller one are chosen, over that.
+  static constexpr double WIDER = 5.0;
+
   /// Fewer pairs are as fast in one thread.
   static constexpr std::size_t MANY = 2000;
 
@@ -462,13 +465,12 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
 
   std::vector<Shape> shapes;
   Coordinates coordinates;
-  NearPairs wide, pairs;             // `pairs` are those of `wide` that are within `skin`
-  std::vector<std::int64_t> chosen;  // (M,) their indices in `wide`
-  double skin = 0.0;
+  double skin;
+  double reach = 0.0;     // largest distance of the centres of touching particles
+  NearPairs wide, pairs;  // `pairs` are those of `wide` that are within `skin`
   bool remembers = false, along_bodies = false;
   std::vector<TurnMatrix> axes;  // (N,) of the Hessian's rotations in space; empty if these are its
   mutable std::vector<Start> starts;  // (M,) of `pairs`
-  bool is_outrun = false;             // `pairs` do not hold at a point, and `wide` neither
   Laws<Law> laws;
   Poses held;
   Poses base;
@@ -487,6 +489,8 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   std::unique_ptr<Team> team;
   std::vector<std::vector<Curved>> curved;  // for each thread, empty between uses
 
+  bool has_pairs() const { return moved.has_value(); }
+
   Team *team_for(std::size_t n) const { return n < MANY ? nullptr : team.get(); }
 
   Fill fill() const { return D == 2 || shapes.size() <= FEW ? Fill::COMPLETE : Fill::NONE; }
@@ -495,14 +499,10 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   {
     S trace = 0.0;
     for (int k = 0; k < D; ++k) trace += sums.virial[(D + 1) * k];
-    return {static_cast<double>(sums.energy),
-            gradient(sums, at),
-            static_cast<double>(-trace),
-            static_cast<double>(sums.bond_force),
-            sums.n_bonds,
-            of_wide(sums.crossing),
-            of_wide(sums.unconverged),
-            doubles_of(sums.virial)};
+    return {
+        static_cast<double>(sums.energy),     gradient(sums, at),     static_cast<double>(-trace),
+        static_cast<double>(sums.bond_force), sums.n_bonds,           particles_of(sums.crossing),
+        particles_of(sums.unconverged),       doubles_of(sums.virial)};
   }
 
   template <class S> static std::vector<double> doubles_of(const Vec<D * D, S> &virial)
@@ -561,8 +561,12 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     return {shapes, there.view(at.strain), list.list(), laws};
   }
 
-  /// The number of a pair, or -1, in the caller's numbering.
-  std::int64_t of_wide(std::int64_t p) const { return p < 0 ? p : chosen[p]; }
+  /// The particles of a pair, which may be -1 for none.
+  std::array<std::int64_t, 2> particles_of(std::int64_t p) const
+  {
+    if (p < 0) return {-1, -1};
+    return {pairs.particles[2 * p], pairs.particles[2 * p + 1]};
+  }
 
   template <class S>
   Eigen::VectorXd gradient(const PairSums<D, S> &sums, const Displacement &at) const
@@ -765,15 +769,24 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     return by;
   }
 
+  /// Finds the pairs of the wider skin at a point.
+  void find(const Displacement &at)
+  {
+    there = base;
+    displace(there, at);
+    settle(there, at.strain);
+    const double wider = WIDER * skin;
+    ListedPairs found = near_particles<Model, D>(shapes, laws, there.view(0.0), wider);
+    wide = {std::move(found.particles), std::move(found.shift), there, wider, reach + wider};
+  }
+
   /// Chooses the wide pairs that are within the smaller skin at a point.
   void choose(const Displacement &at)
   {
-    pairs = {{}, {}, {}, skin, wide.reach - wide.skin + skin};
-    chosen.clear();
+    pairs = {{}, {}, {}, skin, reach + skin};
     const PosedPairs<Model, D, double> posed = posed_at<double>(wide, at);
     for (std::size_t p = 0; p < posed.size(); ++p) {
       if (!posed.are_closer(p, skin)) continue;
-      chosen.push_back(static_cast<std::int64_t>(p));
       for (int k = 0; k < 2; ++k) pairs.particles.push_back(wide.particles[2 * p + k]);
       for (int k = 0; k < D; ++k) pairs.shift.push_back(wide.shift[D * p + k]);
     }

@@ -69,12 +69,11 @@ template <class Model, int D> class MovedPairs : public BodyPairs<Model, D, doub
       shift(particle_shapes.size()),
       orientation(particle_shapes.size(), Quaternion{1.0, 0.0, 0.0, 0.0})
   {
-    const PosedPairs<Model, D, double> posed(particle_shapes, list.then.view(0.0), list.list(),
-                                             contact_laws);
-    for (std::size_t p = 0; p < posed.size(); ++p) {
+    const SplitPoses then = list.then.view(0.0);
+    for (std::size_t p = 0; p < this->size(); ++p) {
       const double reach = this->around[first(p)] + this->around[second(p)];
       reach_sq.push_back(reach * reach);
-      before.push_back(posed.template separation_in<long double>(p));
+      before.push_back(separation_of<D, long double>(then, this->pairs, p));
     }
     apart.resize(before.size());
     strain_by(std::vector<double>(D * D));

@@ -82,13 +82,10 @@ struct StageEnd {
 class StageSolver {
  public:
   using Vector = Eigen::VectorXd;
-  /// Gives the local energy model pairs, some of which hold at a displacement.
-  using Renew = std::function<void(const Displacement &)>;
 
   StageSolver(LocalEnergyModel &landscape, const Stage &equation, const StageUnits &scales,
-              const StageLimits &bounds, Renew renew) :
-      about(landscape), stage(equation), units(scales), limits(bounds),
-      renew_pairs(std::move(renew))
+              const StageLimits &bounds) :
+      about(landscape), stage(equation), units(scales), limits(bounds)
   {
   }
 
@@ -129,7 +126,7 @@ class StageSolver {
           size_before = 0.0;
         }
       }
-      if (tried.sums.crossing >= 0) break;
+      if (tried.sums.crosses()) break;
       at = std::move(tried);
       before = step;
     }
@@ -185,7 +182,6 @@ class StageSolver {
   const Stage &stage;
   const StageUnits &units;
   const StageLimits &limits;
-  Renew renew_pairs;
   StageFactors known;
   std::vector<Valley> valleys;
   std::vector<Kink> held;  // on which the state is held, or from which it was released to a side
@@ -205,17 +201,11 @@ class StageSolver {
   Point point(Vector x)
   {
     const Displacement at{x.data(), 0.0};
-    if (!about.holds(at)) renew(at);
+    about.renew_pairs(at);
     ++evaluations;
     LandscapeSums sums = about.evaluate(at, stage.extended);
     Vector gradient = sums.gradient + stage.drag.cwiseProduct(x - stage.centre);
     return {std::move(x), std::move(sums), std::move(gradient)};
-  }
-
-  void renew(const Displacement &at)
-  {
-    renew_pairs(at);
-    about.holds(at);
   }
 
   Point begin(const Vector &guess, const Vector &other)
@@ -223,7 +213,7 @@ class StageSolver {
     Point first = point(guess);
     const bool collides = first.gradient.size() > 0 &&
                           !(first.gradient.cwiseAbs().maxCoeff() <= COLLISION * units.force);
-    return first.sums.crossing >= 0 || collides ? point(other) : first;
+    return first.sums.crosses() || collides ? point(other) : first;
   }
 
   /// The correction by the present factors, as long as they serve. Kinks that it would leave are

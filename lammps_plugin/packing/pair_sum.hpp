@@ -47,6 +47,32 @@ struct PairList {
   const std::int64_t *shift;
 };
 
+/// x_i - x_j of a pair in the scalar T, without rounding errors except that of T itself.
+template <int D, class T>
+Vec<D, T> separation_of(const SplitPoses &poses, const PairList &list, std::size_t p)
+{
+  const std::size_t i = list.particles[2 * p], j = list.particles[2 * p + 1];
+  Split apart[D];
+  for (int k = 0; k < D; ++k) {
+    apart[k] = difference(at(poses.position, D * i + k), at(poses.position, D * j + k));
+  }
+  for (int m = 0; m < D; ++m) {
+    const std::int64_t turns = list.shift[D * p + m];  // zero for most pairs
+    for (int k = 0; k <= m && turns != 0; ++k) {
+      apart[k] = difference(apart[k], at(poses.cell, D * k + m), static_cast<double>(turns));
+    }
+  }
+  Vec<D, T> r;
+  for (int k = 0; k < D; ++k) {
+    if constexpr (std::is_same_v<T, double>) {
+      r[k] = apart[k].value + (apart[k].rest + poses.strain * apart[k].value);
+    } else {
+      r[k] = (T(1) + poses.strain) * joined(apart[k]);
+    }
+  }
+  return r;
+}
+
 namespace detail {
 
 /// Computes a contact in doubles, starting from the pair's previous one if that is given and the
@@ -164,18 +190,7 @@ template <class Model, int D, class S> class PosedPairs : public BodyPairs<Model
 
   template <class T> Vec<D, T> separation_in(std::size_t p) const
   {
-    const std::size_t i = first(p), j = second(p);
-    Split apart[D];
-    for (int k = 0; k < D; ++k) {
-      apart[k] = difference(at(poses.position, D * i + k), at(poses.position, D * j + k));
-    }
-    for (int m = 0; m < D; ++m) {
-      const std::int64_t turns = this->pairs.shift[D * p + m];
-      if (turns != 0) move_along(m, static_cast<double>(turns), apart);
-    }
-    Vec<D, T> r;
-    for (int k = 0; k < D; ++k) r[k] = strained<T>(apart[k]);
-    return r;
+    return separation_of<D, T>(poses, this->pairs, p);
   }
 
   bool may_touch(std::size_t p, const Vec<D, S> &r) const
@@ -218,24 +233,6 @@ template <class Model, int D, class S> class PosedPairs : public BodyPairs<Model
  private:
   using Base::shapes;
   SplitPoses poses;
-
-  /// Shifts the second particle of a pair by a number of one of the cell vectors; zero for most
-  /// pairs.
-  void move_along(int vector, double turns, Split *apart) const
-  {
-    for (int k = 0; k <= vector; ++k) {
-      apart[k] = difference(apart[k], at(poses.cell, D * k + vector), turns);
-    }
-  }
-
-  template <class T> T strained(const Split &length) const
-  {
-    if constexpr (std::is_same_v<T, double>) {
-      return length.value + (length.rest + poses.strain * length.value);
-    } else {
-      return (T(1) + poses.strain) * joined(length);
-    }
-  }
 
   QuaternionOf<S> orientation_of(std::size_t n) const { return orientation_in<S>(n); }
 

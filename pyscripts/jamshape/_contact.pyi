@@ -17,8 +17,7 @@ _Reals: TypeAlias = NDArray[np.float64]
 _Ints: TypeAlias = NDArray[np.int64]
 _Bools: TypeAlias = NDArray[np.bool_]
 _Arrays: TypeAlias = dict[str, NDArray[Any]]
-_Sums: TypeAlias = tuple[float, _Reals, float, float, int, int, int, _Reals]
-_Renew: TypeAlias = Callable[[_Reals, float], None]
+_Sums: TypeAlias = tuple[float, _Reals, float, float, int, _Ints, _Ints, _Reals]
 
 class _Shape:
     """Any of the classes; `Shape.compiled` looks them up by name."""
@@ -79,6 +78,9 @@ class _Shape:
         power: float = 2.0,
     ) -> None: ...
     def host_spin(self, orientation: _Reals, gradient: _Reals) -> _Reals: ...
+    def near_particles(
+        self, position: _Reals, orientation: _Reals, cell: _Reals, margin: float
+    ) -> tuple[_Ints, _Ints]: ...
     def near(
         self,
         position: _Reals,
@@ -137,7 +139,7 @@ class _Shape:
         seed: int,
     ) -> dict[str, Any]: ...
     def local_energy_model(
-        self, column: _Ints, rotation_length: _Reals, turning_radius: _Reals
+        self, column: _Ints, rotation_length: _Reals, turning_radius: _Reals, skin: float
     ) -> LocalEnergyModel: ...
 
 def union_moments(discs: _Reals, dimension: int) -> _Reals: ...
@@ -149,6 +151,7 @@ def find_rattlers(
 def box_times(
     drag: float, measure: float, stiffness: float, dimension: int
 ) -> tuple[float, float]: ...
+def near_spheres(centre: _Reals, radius: _Reals, cell: _Reals) -> tuple[_Ints, _Ints]: ...
 def instruction_sets() -> list[str]: ...
 def sparse_product(
     first: _Ints, column: _Ints, value: _Reals, dense: _Reals, is_long: bool
@@ -251,20 +254,10 @@ class LocalEnergyModel:
     def move(self, x: _Reals, strain: float) -> tuple[_Reals, _Reals, _Reals]: ...
     def hold(self) -> None: ...
     def deform(self, matrix: _Reals, turns: _Reals) -> None: ...
-    def take_pairs(
-        self,
-        position: _Reals,
-        orientation: _Reals,
-        cell: _Reals,
-        pairs: _Ints,
-        shift: _Ints,
-        wide: float,
-        reach: float,
-        skin: float,
-    ) -> None: ...
+    def forget_pairs(self) -> None: ...
     def share(self, threads: int) -> None: ...
     def follow_bodies(self) -> None: ...
-    def evaluate(self, x: _Reals, strain: float, extended: bool) -> _Sums | None: ...
+    def evaluate(self, x: _Reals, strain: float, extended: bool) -> _Sums: ...
     def part_within(self, x: _Reals, longest_step: float, widest_turn: float) -> float: ...
     def factorise(self, x: _Reals, strain: float, diagonal: _Reals) -> Factors: ...
     def solve_stage(
@@ -272,13 +265,11 @@ class LocalEnergyModel:
         stage: Stage,
         factors: Factors | None,
         bonds_of_factors: int,
-        renew: _Renew,
         kinks: StageKinks = ...,
     ) -> StageEnd: ...
     def descend(
         self,
         stop: DescentStop,
         shift: float,
-        renew: _Renew,
         tell: Callable[[tuple[float, int, float, float]], None],
     ) -> DescentEnd: ...

@@ -124,7 +124,8 @@ def of_shapes(fuzz):
     )
     pairs = {"pairs": np.array([[0, 1], [1, 2]]), "shift": np.zeros((2, dimension), np.int64)}
     over_pairs(fuzz, of, poses | pairs)
-    return of, dimension, poses, pairs
+    fuzz.call("near_particles", of.near_particles, **poses, margin=0.1)
+    return of, dimension, poses
 
 
 def probes(fuzz, dimension):
@@ -147,6 +148,10 @@ def probes(fuzz, dimension):
         "superellipsoid_motion_sq", _contact.superellipsoid_motion_sq, then=boxes[:1], now=boxes[1:]
     )
     fuzz.call("superellipsoid_overlap", _contact.superellipsoid_overlap, **j)
+    fuzz.call(
+        "near_spheres", _contact.near_spheres, centre=np.ones((2, dimension)), radius=np.ones(2),
+        cell=5.0 * np.eye(dimension),
+    )  # fmt: skip
     fuzz.call("counts_of_team", _contact.counts_of_team, threads=2, first_that_fails=1, rounds=2)
     flat = np.zeros((2, 2), bool)
     pairs, normals = np.array([[0, 1], [1, 2]]), np.ones((2, 3))
@@ -156,19 +161,19 @@ def probes(fuzz, dimension):
     )  # fmt: skip
 
 
-def of_vicinity(fuzz, of, dimension, poses, pairs):
+def of_vicinity(fuzz, of, dimension, poses):
     """Call the methods of a local energy model in any order, before and after it has a base and pairs."""
     n_turns = 1 if dimension == 2 else 3
     column = np.arange(3 * (dimension + n_turns)).reshape(3, -1)
     lengths = {"rotation_length": np.ones(3), "turning_radius": np.ones(3)}
-    about = fuzz.call("local_energy_model", of.local_energy_model, column=column, **lengths)
+    about = fuzz.call(
+        "local_energy_model", of.local_energy_model, column=column, **lengths, skin=0.3
+    )
     if about is None:
-        about = particles(type(of), dimension).local_energy_model(column, np.ones(3), np.ones(3))
+        about = particles(type(of), dimension).local_energy_model(
+            column, np.ones(3), np.ones(3), 0.3
+        )
     n, held = column.size, {"factors": None}
-    near = {"wide": 1.5, "reach": 30.0, "skin": 0.3}
-
-    def renew(_x, _strain):
-        fuzz.call("take_pairs", about.take_pairs, **poses, **pairs, **near)
 
     def deform():
         matrix = np.stack([np.eye(dimension), np.zeros((dimension, dimension))])
@@ -220,7 +225,6 @@ def of_vicinity(fuzz, of, dimension, poses, pairs):
                 stage=stage,
                 factors=held["factors"],
                 bonds_of_factors=1,
-                renew=renew,
             )
 
     def descend():
@@ -229,9 +233,7 @@ def of_vicinity(fuzz, of, dimension, poses, pairs):
             rounding=1e-16, newton_below=1e-2, is_near=False, longest_step=0.1, widest_turn=0.1,
         )  # fmt: skip
         if stop is not None:
-            end = fuzz.call(
-                "descend", about.descend, stop=stop, shift=1.0, renew=renew, tell=lambda _: None
-            )
+            end = fuzz.call("descend", about.descend, stop=stop, shift=1.0, tell=lambda _: None)
             if end is not None:
                 repr((end.outcome, end.sums, end.rows))
 
@@ -252,7 +254,7 @@ def of_vicinity(fuzz, of, dimension, poses, pairs):
             "evaluate", about.evaluate, x=np.zeros(n), strain=0.0, extended=False
         ),
         "factorise": factorise,
-        "take_pairs": lambda: renew(None, None),
+        "forget_pairs": about.forget_pairs,
         "newton": newton,
         "part_within": lambda: fuzz.call(
             "part_within", about.part_within, x=np.ones(n), longest_step=0.1, widest_turn=0.1
@@ -261,7 +263,7 @@ def of_vicinity(fuzz, of, dimension, poses, pairs):
         "descend": descend,
     }
     names = list(methods)
-    first = [] if fuzz.random.random() < 0.5 else ["move_to", "take_pairs", "hold"]
+    first = [] if fuzz.random.random() < 0.5 else ["move_to", "forget_pairs", "hold"]
     for name in [*first, *[fuzz.one_of(names) for _ in range(12)]]:
         methods[name]()
 
@@ -271,9 +273,9 @@ def main(seed, rounds):
     resource.setrlimit(resource.RLIMIT_AS, (MOST_BYTES, MOST_BYTES))
     fuzz = Fuzz(seed)
     for _ in range(rounds):
-        of, dimension, poses, pairs = of_shapes(fuzz)
+        of, dimension, poses = of_shapes(fuzz)
         probes(fuzz, dimension)
-        of_vicinity(fuzz, of, dimension, poses, pairs)
+        of_vicinity(fuzz, of, dimension, poses)
     for name, count in sorted(fuzz.counts.items()):
         print(name, count["returned"], count["refused"])
 

@@ -206,17 +206,16 @@ def test_a_network_of_contacts_that_is_none_is_refused():
 COLUMN = np.arange(9).reshape(N, 3)
 
 
-def local_model(column=COLUMN, length=1.0):
+def local_model(column=COLUMN, length=1.0, skin=0.5):
     lengths = np.full(N, length)
-    return particles(_contact.Spherocylinders, 2).local_energy_model(column, lengths, lengths)
+    return particles(_contact.Spherocylinders, 2).local_energy_model(column, lengths, lengths, skin)
 
 
 def about_a_base():
     of, given = local_model(), arguments(2)
-    pairs = given.pop("pairs"), given.pop("shift")
+    del given["pairs"], given["shift"]
     of.move_to(**given)
-    of.take_pairs(**given, pairs=pairs[0], shift=pairs[1], wide=1.0, reach=9.0, skin=0.5)
-    return of, given, {"pairs": pairs[0], "shift": pairs[1], "wide": 1.0, "reach": 9.0, "skin": 0.5}
+    return of, given
 
 
 def test_coordinates_that_are_not_numbered_once_each_are_refused():
@@ -228,6 +227,9 @@ def test_coordinates_that_are_not_numbered_once_each_are_refused():
     for bad in BAD_NUMBERS:
         with pytest.raises(ValueError, match="of rotation_length is"):
             local_model(length=bad)
+    for bad in (*BAD_NUMBERS, 0.0, -1.0):
+        with pytest.raises(ValueError, match=r"skin is .*, expected a positive length"):
+            local_model(skin=bad)
 
 
 def test_a_landscape_without_a_base_has_no_energy():
@@ -236,12 +238,12 @@ def test_a_landscape_without_a_base_has_no_energy():
         with pytest.raises(ValueError, match="there is no base yet"):
             ask(x, 0.0)
     with pytest.raises(ValueError, match="there is no base yet"):
-        of.solve_stage(stage(), None, 0, lambda *_: None)
+        of.solve_stage(stage(), None, 0)
 
 
 @pytest.mark.parametrize("bad", BAD_NUMBERS)
 def test_points_of_a_landscape_that_are_no_numbers_are_refused(bad):
-    of, given, pairs = about_a_base()
+    of, given = about_a_base()
     x, y = np.zeros(9), np.zeros(9)
     assert of.evaluate(x, 0.0, False) is not None
     y[4] = bad
@@ -255,12 +257,8 @@ def test_points_of_a_landscape_that_are_no_numbers_are_refused(bad):
     for name in given:
         spoilt = given[name].copy()
         spoilt.flat[1] = bad
-        for ask, more in ((of.move_to, {}), (of.take_pairs, pairs)):
-            with pytest.raises(ValueError, match=f"of {name} is"):
-                ask(**given | {name: spoilt}, **more)
-    for name in ("wide", "reach", "skin"):
-        with pytest.raises(ValueError, match="of wide, reach and skin is"):
-            of.take_pairs(**given, **pairs | {name: bad})
+        with pytest.raises(ValueError, match=f"of {name} is"):
+            of.move_to(**given | {name: spoilt})
 
 
 def stage(**parts):
@@ -271,24 +269,30 @@ def stage(**parts):
 
 
 def test_stages_and_factors_of_another_size_are_refused():
-    of, _, _ = about_a_base()
-    end = of.solve_stage(stage(), None, 0, lambda *_: None)
+    of, given = about_a_base()
+    end = of.solve_stage(stage(), None, 0)
     assert end.solved
     for name in ("drag", "centre", "guess", "other"):
         with pytest.raises(ValueError, match="a vector of a stage does not have one number"):
-            of.solve_stage(stage(**{name: np.zeros(8)}), None, 0, lambda *_: None)
+            of.solve_stage(stage(**{name: np.zeros(8)}), None, 0)
         with pytest.raises(ValueError, match="a vector of a stage is nan"):
-            of.solve_stage(stage(**{name: np.full(9, np.nan)}), None, 0, lambda *_: None)
+            of.solve_stage(stage(**{name: np.full(9, np.nan)}), None, 0)
     held = local_model(np.where(COLUMN < 6, COLUMN, -1))
-    given = arguments(2)
-    pairs = {"pairs": given.pop("pairs"), "shift": given.pop("shift")}
     held.move_to(**given)
-    held.take_pairs(**given, **pairs, wide=1.0, reach=9.0, skin=0.5)
     fewer = held.factorise(np.zeros(6), 0.0, np.ones(6))
     with pytest.raises(ValueError, match="right does not have"):
         fewer.solve(np.ones((1, 9)))
     with pytest.raises(ValueError, match="factors have another number of coordinates"):
-        of.solve_stage(stage(), fewer, 0, lambda *_: None)
+        of.solve_stage(stage(), fewer, 0)
+
+
+def test_a_pair_that_crosses_is_named_by_its_particles():
+    of, given = about_a_base()
+    assert [len(rows) for rows in of.evaluate(np.zeros(9), 0.0, False)[5:7]] == [0, 0]
+    given["position"][0, 2] = given["position"][0, 1]
+    given["orientation"][0, 2] = 1.0
+    of.move_to(**given)
+    np.testing.assert_array_equal(of.evaluate(np.zeros(9), 0.0, False)[5], [[1, 2]])
 
 
 def deformation(dimension=2):
@@ -342,10 +346,9 @@ def test_teams_of_no_size_are_refused(threads):
 
 def test_particles_without_coordinates_have_an_empty_gradient():
     """Arrays without rows have no place to begin at."""
-    of, given, pairs = about_a_base()
+    _, given = about_a_base()
     of = local_model(np.full_like(COLUMN, -1))
     of.move_to(**given)
-    of.take_pairs(**given, **pairs)
     assert of.evaluate(np.zeros(0), 0.0, False)[1].shape == (0,)
     assert _contact.find_rattlers(
         0, 2, np.zeros((0, 2), int), np.zeros((0, 3)), np.zeros((0, 2), bool)

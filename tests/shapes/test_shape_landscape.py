@@ -260,17 +260,22 @@ def test_long_doubles_agree_with_doubles(packing):
 def test_lists_of_pairs_are_renewed_in_time(case, measured):
     packing = pressed(case)
     landscape, state = Landscape(packing), State.of(packing)
+    local_model, origin = LocalEnergyModel(landscape, state), np.zeros(landscape.size)
     rng, renewed, lists = np.random.default_rng(9), 0, None
     for _ in range(60):
         step = 0.03 * landscape.length * rng.uniform(-1, 1, landscape.size)
-        state = landscape.displaced(state, step).strained(rng.uniform(-3e-3, 3e-3))
+        local_model.move(step, rng.uniform(-3e-3, 3e-3))
+        state = local_model.base
         try:
             expected = Landscape(packing).evaluate(state, extended=False)
         except CrossingError:
             break
-        found = landscape.evaluate(state, extended=False)
-        assert found.n_bonds == expected.n_bonds
-        assert found.energy == close_to(expected.energy, ROUNDING)
+        for found in (
+            landscape.evaluate(state, extended=False),
+            local_model.evaluate(origin, 0.0, extended=False),
+        ):
+            assert found.n_bonds == expected.n_bonds
+            assert found.energy == close_to(expected.energy, ROUNDING)
         renewed += landscape.pairs_at(state) is not lists
         lists = landscape.pairs_at(state)
     measured(renewed=renewed)

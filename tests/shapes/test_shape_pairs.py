@@ -16,7 +16,7 @@ from jamshape.contacts import (
     PairArrays,
     forces,
 )
-from jamshape.contacts.near import NearPairs, Spheres, each_once, near_pairs, near_particles
+from jamshape.contacts.near import NearPairs, near_particles, near_spheres
 from jamshape.packing import State
 from jamshape.shapes.shape import Interaction
 
@@ -39,8 +39,7 @@ def test_boxes_side_by_side_are_one_packing(packing, network):
 
 def every_pair(packing, margin=0.0):
     """All pairs with all images whose bounding spheres are closer than a margin."""
-    around = Spheres(packing.position, packing.outer_radius + margin)
-    return each_once(near_pairs(around, around, packing.box))
+    return near_spheres(packing.position, packing.outer_radius + margin, packing.box)
 
 
 def rows_of(near):

@@ -197,10 +197,11 @@ def find_contacts(
     near = near_particles(state, bodies)
     found = bodies.contacts(*PairArrays.of(state, near), packing.has_rests, errors)
     near = near.take(found["pair"])
-    refuse_crossing(packing, bodies.core, near.take(found["status"] == _CROSSING))
-    refuse_unconverged(packing, near.take(found["status"] == _UNCONVERGED))
+    pairs = np.column_stack([near.first, near.second])
+    refuse_crossing(packing, bodies.core, pairs[found["status"] == _CROSSING])
+    refuse_unconverged(packing, pairs[found["status"] == _UNCONVERGED])
     return ContactNetwork(
-        pairs=np.column_stack([near.first, near.second]),
+        pairs=pairs,
         shift=near.shift,
         separation=_separation(state, near),
         kind=found["kind"].astype(np.int64),
@@ -239,16 +240,16 @@ def sum_forces(packing: Packing, network: ContactNetwork) -> Forces:
     )
 
 
-def refuse_crossing(packing: Packing, core: str, crossing: NearPairs) -> None:
-    """Raise for pairs whose `core` crosses.
+def refuse_crossing(packing: Packing, core: str, crossing: IntArray) -> None:
+    """Raise for pairs (M, 2) of particles whose `core` crosses, if there are any.
 
     Raises
     ------
     CrossingError
     """
-    n = len(crossing.first)
+    n = len(crossing)
     if n:
-        first, second = packing.id[crossing.first[0]], packing.id[crossing.second[0]]
+        first, second = packing.id[crossing[0]]
         more = f" (1 of {n} such pairs)" if n > 1 else ""
         msg = (
             f"the {core} of particles {first} and {second} cross{more}, expected overlaps smaller than"
@@ -257,15 +258,15 @@ def refuse_crossing(packing: Packing, core: str, crossing: NearPairs) -> None:
         raise CrossingError(msg)
 
 
-def refuse_unconverged(packing: Packing, failed: NearPairs) -> None:
-    """Raise for pairs whose contact is ContactStatus::UNCONVERGED.
+def refuse_unconverged(packing: Packing, failed: IntArray) -> None:
+    """Raise for pairs (M, 2) of particles whose contact is ContactStatus::UNCONVERGED, if there are any.
 
     Raises
     ------
     ValueError
     """
-    if len(failed.first):
-        first, second = packing.id[failed.first[0]], packing.id[failed.second[0]]
+    if len(failed):
+        first, second = packing.id[failed[0]]
         msg = (
             f"the contact of particles {first} and {second} did not converge; keep semi-axes within a"
             " factor 100 and exponents from 0.55 to 10"

@@ -30,17 +30,12 @@ class Pairs:
         pairs = np.column_stack([near.first, near.second])
         return cls(pairs, near.shift, state, skin, reach + skin)
 
-    @property
-    def near(self) -> NearPairs:
-        """The pairs as arguments of the functions of `contacts`."""
-        return NearPairs(self.particles[:, 0], self.particles[:, 1], self.shift)
-
-    def outrun_by(self, now: State, turning_radius: FloatArray, kept: float = 0.0) -> bool:
-        """Whether two surfaces may have approached by `skin`, or by `skin` minus `kept`."""
+    def outrun_by(self, now: State, turning_radius: FloatArray) -> bool:
+        """Whether two surfaces may have approached by `skin`."""
         position, orientation, cell = (part[0] for part in now.split)
         position_then, orientation_then, cell_then = (part[0] for part in self.then.split)
         grown = affine_change(cell_then, cell)
-        left = self.skin - kept - _strain_of(grown) * self.reach
+        left = self.skin - _strain_of(grown) * self.reach
         moved = np.sqrt(((position - position_then @ grown.T) ** 2).sum(axis=1))
         turn = orientation - orientation_then
         if now.dimension == 2:

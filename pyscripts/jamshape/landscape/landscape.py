@@ -16,13 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from jamshape.arrays import BoolArray, FloatArray, IntArray
 from jamshape.contacts import PairArrays, Pairs, find_contacts, find_rattlers
-from jamshape.contacts.near import near_particles, nearer
+from jamshape.contacts.near import near_particles
 from jamshape.contacts.network import refuse_crossing, refuse_unconverged
 from jamshape.packing import Packing, State
 from jamshape.shapes.shape import Stiffness
 
 _SKIN = 0.3  # of the pair list, over the smallest radius
-_WIDE = 5.0  # skin of the wide list over that
 
 
 class Evaluation(NamedTuple):
@@ -77,7 +76,6 @@ class Landscape:
         self.bodies = packing.compiled(law)
         self.evaluations = 0
         self._pairs: Pairs | None = None
-        self._wide: Pairs | None = None
 
     def __reduce__(self) -> tuple[type[Landscape], tuple[Packing, Stiffness, int]]:
         return type(self), (self.particles, self.k_e, self.sides)
@@ -138,7 +136,7 @@ class Landscape:
 
     def forget_pairs(self) -> None:
         """Rebuild the pair list, so that results depend on the state alone, to the last bit."""
-        self._pairs = self._wide = None
+        self._pairs = None
 
     def components(self, vector: FloatArray) -> FloatArray:
         """Scatter an (n,) vector to (N, D + rotations), with 0 where there is no coordinate."""
@@ -171,9 +169,7 @@ class Landscape:
             If a contact did not converge.
         """
         self.evaluations += 1
-        pairs = self.pairs_at(state)
-        found = self.bodies.sums(*self._arrays(state, pairs), extended)
-        self.refuse(pairs, found["crossing"], found["unconverged"])
+        found = self._sums(state, extended)
         slope = -np.column_stack([found["force"], found["torque"] / self._length_or_1[:, None]])
         n_bonds = found["n_bonds"]
         return Evaluation(
@@ -190,17 +186,25 @@ class Landscape:
 
         -p_xy is the derivative of the energy under simple shear, x displaced by gamma y, at fixed orientations.
         """
-        pairs = self.pairs_at(state)
-        found = self.bodies.sums(*self._arrays(state, pairs), True)
-        self.refuse(pairs, found["crossing"], found["unconverged"])
+        found = self._sums(state, True)
         return np.asarray(found["virial"].T / state.volume, np.float64)
 
-    def refuse(self, pairs: Pairs, crossing: int, unconverged: int) -> None:
-        """Raise like `evaluate` for a crossing or unconverged pair; -1 means none."""
-        if crossing >= 0:
-            refuse_crossing(self.particles, self.bodies.core, pairs.near.take(np.array([crossing])))
-        if unconverged >= 0:
-            refuse_unconverged(self.particles, pairs.near.take(np.array([unconverged])))
+    def refuse(self, crossing: IntArray, unconverged: IntArray) -> None:
+        """Raise like `evaluate` for pairs (k, 2) of crossing or unconverged particles, if there are any."""
+        refuse_crossing(self.particles, self.bodies.core, crossing)
+        refuse_unconverged(self.particles, unconverged)
+
+    def _sums(self, state: State, extended: bool) -> dict[str, Any]:
+        pairs = self.pairs_at(state)
+        found: dict[str, Any] = self.bodies.sums(*self._arrays(state, pairs), extended)
+        refused = (found[name] for name in ("crossing", "unconverged"))  # rows, or -1
+        self.refuse(
+            *(
+                pairs.particles[row : row + 1] if row >= 0 else pairs.particles[:0]
+                for row in refused
+            )
+        )
+        return found
 
     def curvature(self, state: State, *, extended: bool = False) -> Curvature:
         """Evaluate all second derivatives; arguments and errors as `evaluate`."""
@@ -310,24 +314,9 @@ class Landscape:
     def pairs_at(self, state: State) -> Pairs:
         """Return the pairs that may touch at a state, rebuilding the list if needed."""
         if self._pairs is None or self._pairs.outrun_by(state, self.turning_radius):
-            return self.renewed_pairs(state)
+            near = near_particles(state, self.bodies, self.skin)
+            self._pairs = Pairs.of(near, state, self.skin, self._reach)
         return self._pairs
-
-    def renewed_pairs(self, state: State) -> Pairs:
-        """Find the pairs that may touch at a state, among those of a wider skin, valid for longer."""
-        wide = self.wide_pairs(state)
-        near = nearer(state, self.bodies, wide.near, self.skin)
-        self._pairs = Pairs.of(near, state, self.skin, self._reach)
-        return self._pairs
-
-    def wide_pairs(self, state: State) -> Pairs:
-        """Return the pairs of a wider skin, rebuilt once some that may touch could be missing."""
-        wide = self._wide
-        if wide is None or wide.outrun_by(state, self.turning_radius, self.skin):
-            skin = _WIDE * self.skin
-            near = near_particles(state, self.bodies, skin)
-            wide = self._wide = Pairs.of(near, state, skin, self._reach)
-        return wide
 
     @cached_property
     def skin(self) -> float:

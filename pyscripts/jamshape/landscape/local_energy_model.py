@@ -13,7 +13,6 @@ import numpy as np
 
 from jamshape import _contact
 from jamshape.arrays import FloatArray
-from jamshape.contacts import Pairs
 from jamshape.landscape.landscape import Evaluation, Landscape
 from jamshape.landscape.newton import LONGEST_STEP, WIDEST_TURN, Factorisation
 from jamshape.landscape.threads import threads
@@ -107,13 +106,12 @@ class LocalEnergyModel:
     def __init__(self, landscape: Landscape, base: State, *, along_bodies: bool = False) -> None:
         self.landscape, self._along_bodies = landscape, along_bodies
         self._compiled = landscape.bodies.local_energy_model(
-            landscape.column, landscape.rotation_length, landscape.turning_radius
+            landscape.column, landscape.rotation_length, landscape.turning_radius, landscape.skin
         )
         self._compiled.share(threads())
         if along_bodies:
             self._compiled.follow_bodies()
         self.move_to(base)
-        self._take(landscape.wide_pairs(base))
 
     def move_to(self, base: State) -> None:
         """Move the base to another state."""
@@ -148,7 +146,7 @@ class LocalEnergyModel:
     def forget_pairs(self) -> None:
         """Rebuild the pair list, so that results depend on the base alone, to the last bit."""
         self.landscape.forget_pairs()
-        self._take(self.landscape.wide_pairs(self.base))
+        self._compiled.forget_pairs()
 
     def move(self, x: FloatArray, strain: float) -> None:
         """Move the base to the state `at(x, strain)`."""
@@ -165,11 +163,7 @@ class LocalEnergyModel:
     def evaluate(self, x: FloatArray, strain: float, *, extended: bool) -> Evaluation:
         """Evaluate the state `at(x, strain)`, with the errors of `Landscape.evaluate`."""
         self.landscape.evaluations += 1
-        found = self._compiled.evaluate(x, strain, extended)
-        if found is None:
-            self._renew(x, strain)
-            found = self._compiled.evaluate(x, strain, extended)
-        return self._accepted(found)
+        return self._accepted(self._compiled.evaluate(x, strain, extended))
 
     def factorise(self, x: FloatArray, strain: float, diagonal: FloatArray) -> Factorisation:
         """Factorise the Hessian at x plus a diagonal, shifted if it is not positive definite.
@@ -197,7 +191,7 @@ class LocalEnergyModel:
         factors, n_bonds, kinks = None, 0, known or StageKinks()
         if isinstance(known, StageFactors):
             factors, n_bonds, kinks = known.factors.compiled, known.n_bonds, known.kinks
-        end = self._compiled.solve_stage(posed, factors, n_bonds, self._renew, kinks)
+        end = self._compiled.solve_stage(posed, factors, n_bonds, kinks)
         self.landscape.evaluations += end.evaluations
         found = None
         if end.factors is not None:
@@ -223,7 +217,7 @@ class LocalEnergyModel:
         ValueError
             If a contact does not converge there.
         """
-        end = self._compiled.descend(stop, shift, self._renew, lambda _row: None)
+        end = self._compiled.descend(stop, shift, lambda _row: None)
         self.landscape.evaluations += end.evaluations
         self.base = State.joined(*self._compiled.poses)
         return DescentEnd(end.outcome, self._accepted(end.sums), end.rows)
@@ -244,18 +238,7 @@ class LocalEnergyModel:
         energy, gradient, strain_gradient, bond_force, n_bonds, crossing, unconverged, virial = (
             found
         )
-        self.landscape.refuse(self._pairs, crossing, unconverged)
+        self.landscape.refuse(crossing, unconverged)
         bond_force /= max(n_bonds, 1)
         virial = virial.reshape(self.base.dimension, -1)
         return Evaluation(energy, gradient, strain_gradient, bond_force, n_bonds, virial)
-
-    def _renew(self, x: FloatArray, strain: float) -> None:
-        self.base = State.joined(*self._compiled.poses)
-        self._take(self.landscape.wide_pairs(self.at(x, strain)))
-
-    def _take(self, pairs: Pairs) -> None:
-        self._pairs = pairs
-        self._compiled.take_pairs(
-            *pairs.then.split, pairs.particles, pairs.shift, pairs.skin, pairs.reach,
-            self.landscape.skin,
-        )  # fmt: skip

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from jamshape.arrays import BoolArray, FloatArray, IntArray
-from jamshape.contacts.near import NearPairs, Spheres, each_once, near_pairs
+from jamshape.contacts.near import NearPairs, near_spheres
 from jamshape.packing import Box, Packing, affine_change
 from jamshape.records import Record
 
@@ -164,8 +164,7 @@ def _moved(first: Packing, second: Packing, box: Box, change: FloatArray) -> Flo
 
 def _neighbours(packing: Packing, cutoff: float) -> NearPairs:
     """Find pairs of centres within a distance, each from both sides."""
-    around = Spheres(packing.position, np.full(packing.n, 0.5 * cutoff))
-    once = each_once(near_pairs(around, around, packing.box))
+    once = near_spheres(packing.position, np.full(packing.n, 0.5 * cutoff), packing.box)
     both = zip(once, (once.second, once.first, -once.shift), strict=True)
     return NearPairs(*(np.concatenate(parts) for parts in both))
 

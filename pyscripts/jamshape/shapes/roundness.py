@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import scipy  # loads scipy.special only once it is used
 from numpy.typing import ArrayLike
-from scipy.special import elliprg, gamma
 
 from jamshape.arrays import FloatArray
 
@@ -145,7 +145,9 @@ def volume(semi_axes: ArrayLike, p: ArrayLike) -> FloatArray:
     (...) array of float64, [length^3]
     """
     axes, exponent = checked(semi_axes, p)
-    of_unit = 8 * gamma(1 + 0.5 / exponent) ** 3 / gamma(1 + 1.5 / exponent)
+    of_unit = (
+        8 * scipy.special.gamma(1 + 0.5 / exponent) ** 3 / scipy.special.gamma(1 + 1.5 / exponent)
+    )
     return np.asarray(of_unit * axes.prod(axis=-1))
 
 
@@ -224,7 +226,7 @@ def _area_of(axes: FloatArray, p: float) -> tuple[float, float]:
     unit = axes / size
     if p == 1:
         a, b, c = unit**2
-        area = 4 * np.pi * float(elliprg(a * b, b * c, c * a))
+        area = 4 * np.pi * float(scipy.special.elliprg(a * b, b * c, c * a))
         return size**2 * area, size**2 * area * _CONVERGED
     scale = 3 * float(volume(unit, p)) * size**2
     mean, change = _mean_slope(unit, p, _STEPS[0]), np.inf

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import scipy  # loads scipy.optimize, which takes a quarter of a second, only once it is used
 import scipy.sparse
-from scipy.optimize import linprog
 
 from jamshape.arrays import BoolArray, FloatArray, IntArray
 from jamshape.landscape import Landscape, State
@@ -170,7 +170,7 @@ class _Limits(NamedTuple):
         most = np.concatenate([self.gap, np.ones(2 * len(self.moved))])
         bounds = np.column_stack([-self.limit, self.limit])
         largest = float(np.abs(cost).max()) or 1.0
-        found = linprog(cost / largest, A_ub=rows, b_ub=most, bounds=bounds)
+        found = scipy.optimize.linprog(cost / largest, A_ub=rows, b_ub=most, bounds=bounds)
         return np.asarray(found.x) if found.status == 0 else np.zeros(len(cost))
 
 

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from jamshape.contacts.near import Spheres, each_once, near_pairs
+from jamshape.contacts.near import near_spheres
 from jamshape.packing import Box, affine_change
 
 PLANE = Box([0.5, -1], [4, 5], [1])
@@ -102,10 +102,10 @@ def test_cell_vectors_that_are_turned_are_refused(matrix):
 # --- pairs ---------------------------------------------------------------------------------------
 
 
-def tried(spheres, box):
+def tried(centre, radius, box):
     """Pairs of spheres that overlap, by trying so many images that none is left out."""
-    apart = spheres.centre[:, None] - spheres.centre
-    reach = spheres.radius[:, None] + spheres.radius
+    apart = centre[:, None] - centre
+    reach = radius[:, None] + radius
     most = np.ceil((reach.max() + np.abs(apart).max()) / box.spacings).astype(int)
     found = set()
     for turn in itertools.product(*(range(-m, m + 1) for m in most)):
@@ -118,7 +118,7 @@ def tried(spheres, box):
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("strength", [0.0, 0.5, -0.5, 3.3])
 @pytest.mark.parametrize("edge", [0.4, 1.5, 6.0])
-def test_near_pairs_are_those_of_all_images(dimension, strength, edge):
+def test_near_spheres_are_those_of_all_images(dimension, strength, edge):
     """Also of boxes much shorter than the spheres, and of cells that are all but flat."""
     rng = np.random.default_rng(7)
     strength = min(
@@ -129,12 +129,20 @@ def test_near_pairs_are_those_of_all_images(dimension, strength, edge):
     box = Box(np.linspace(-1, 0.3, dimension), edges, tilt)
     n = {0.4: 4, 1.5: 12, 6.0: 12 if dimension == 2 else 24}[edge]
     centre = box.lo + box.vectors(rng.uniform(-1.5, 1.5, (n, dimension)))
-    spheres = Spheres(centre, rng.uniform(0.2, 0.7, n))
-    near = each_once(near_pairs(spheres, spheres, box))
+    radius = rng.uniform(0.2, 0.7, n)
+    near = near_spheres(centre, radius, box)
     rows = np.column_stack([near.first, near.second, near.shift]).tolist()
     assert len(rows) == len(set(map(tuple, rows)))
-    assert set(map(tuple, rows)) == tried(spheres, box)
+    assert set(map(tuple, rows)) == tried(centre, radius, box)
+    assert rows == sorted(rows)
     assert len(rows) > 0
+
+
+def test_boxes_that_are_no_match_for_their_spheres_are_refused():
+    with pytest.raises(ValueError, match="the box is far shorter than its particles"):
+        near_spheres(np.zeros((1, 2)), np.ones(1), Box([0, 0], [1e-4, 1e-4]))
+    with pytest.raises(ValueError, match="more than 1e15 cell vectors away from the box"):
+        near_spheres(np.full((1, 2), 1e20), np.ones(1), Box([0, 0], [9, 9]))
 
 
 def test_what_rounding_leaves_below_the_diagonal_is_no_rotation():
