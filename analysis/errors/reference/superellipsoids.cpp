@@ -25,7 +25,8 @@ template <int D> constexpr int COLUMNS = 2 * D + TURNS<D> + 1;
 template <int D> SuperellipsoidBody<D, Quad> body_of(const double *row)
 {
   const double *const turn = row + D, *const axes = turn + TURNS<D>;
-  const Superellipsoid shape{{{axes[0], axes[1], D == 2 ? axes[1] : axes[D - 1]}}, axes[D]};
+  const Superellipsoid shape{
+      {{axes[0], axes[1], D == 2 ? axes[1] : axes[D - 1]}}, axes[D], axes[D]};
   auto body = SuperellipsoidModel::body<D, Quad>(shape);
   for (int k = 0; k < D; ++k) body.centre[k] = row[k];
   const Quad half = Quad(0.5) * Quad(turn[0]), zero = 0.0;
