@@ -88,16 +88,14 @@ struct Superellipsoid {
 struct SuperellipsoidForm {
   double p = 1.0, p_across = 1.0;
 
-  /// Reads p, or in 3D n1 = 2p and n2, that of sections across z. Returns nothing unless particles
-  /// of these exponents are strictly convex.
+  /// Reads p, or n1 = 2p and n2, that of sections across z, which are all that counts in 2D.
+  /// Returns nothing unless particles of these exponents are strictly convex.
   static std::optional<SuperellipsoidForm> from(const FormNumbers &numbers, int dimension)
   {
-    if (numbers.empty()) return SuperellipsoidForm{};
-    SuperellipsoidForm form{numbers[0], numbers[0]};
-    if (numbers.size() == 2 && dimension == 3)
-      form = {0.5 * numbers[0], 0.5 * numbers[1]};
-    else if (numbers.size() != 1)
-      return std::nullopt;
+    if (numbers.size() > 2) return std::nullopt;
+    SuperellipsoidForm form;
+    if (numbers.size() == 1) form = {numbers[0], numbers[0]};
+    if (numbers.size() == 2) form = {0.5 * numbers[dimension == 2 ? 1 : 0], 0.5 * numbers[1]};
     for (const double exponent : {form.p, form.p_across}) {
       if (!(exponent > 0.5) || !std::isfinite(exponent)) return std::nullopt;
     }
@@ -333,6 +331,9 @@ template <int D, class S> class PowerNorm {
   using T = ValueOf<S>;
   using Power = Common<T>;
 
+  /// Packs hold bodies with one exponent only, so that their code stays small.
+  static constexpr bool MAY_BE_NESTED = D == 3 && std::is_same_v<T, Power>;
+
   static PowerNorm gauge(const SuperellipsoidBody<D, S> &body, const Powers<Power> &powers)
   {
     Vec<D, T> scale;
@@ -359,7 +360,7 @@ template <int D, class S> class PowerNorm {
 
   NormAt<D, S> at(const Vec<D, S> &v) const
   {
-    if constexpr (D == 3) {
+    if constexpr (MAY_BE_NESTED) {
       if (is_nested()) return gathered(Nested<false>(*this, along_axes(v)));
     }
     return gathered(flat<false>(v));
@@ -368,7 +369,7 @@ template <int D, class S> class PowerNorm {
   /// Not available for dual numbers.
   CurvedNormAt<D, T> curved_at(const Vec<D, T> &v) const
   {
-    if constexpr (D == 3) {
+    if constexpr (MAY_BE_NESTED) {
       if (is_nested()) {
         const Nested<true> c(*this, along_axes(v));
         const Vec<D, T> across = c.across[0] * body->axis[0] + c.across[1] * body->axis[1];

@@ -187,8 +187,8 @@ struct SuperellipsoidModel {
 
   static constexpr const char *NAME = "superellipsoid";
   static constexpr const char *SHAPE_RULE =
-      "a superellipsoid has positive diameters (2a, 2b, 2c) and an exponent p above 0.5, or in 3D "
-      "two exponents n1 n2 above 1";
+      "a superellipsoid has positive diameters (2a, 2b, 2c) and an exponent p above 0.5, or two "
+      "exponents n1 n2 above 1";
   static constexpr const char *CORE = "centres";
   static constexpr int MOST_BONDS = 1;
   static constexpr bool HAS_SIDES = false;
@@ -202,8 +202,9 @@ struct SuperellipsoidModel {
   using Form = SuperellipsoidForm;
   static constexpr const char *FORM = "p";
   static constexpr const char *FORM_RULE =
-      "a finite number above 0.5, or in 3D two numbers n1 n2 above 1 (n1 = n2 = 2p is the same "
-      "body): particles of other exponents are not convex";
+      "a finite number above 0.5, or two numbers n1 n2 above 1, those of LAMMPS, where n1 = n2 = "
+      "2p "
+      "is the same body: particles of other exponents are not convex";
 
   static std::optional<Shape> shape_from(const Vec<3> &semi_axes, const Form &form)
   {
@@ -321,7 +322,7 @@ struct SuperellipsoidModel {
   }
 };
 
-/// Compiled in packs.cpp for each instruction set. Bodies of mixed coordinates do without.
+/// Compiled in packs.cpp for each instruction set. Bodies with two exponents do without.
 template <InstructionSet SET, int D>
 FindContacts<SuperellipsoidModel, D> find_superellipsoid_contacts;
 
@@ -329,8 +330,7 @@ template <int D> struct PacksOf<SuperellipsoidModel, D> {
   static constexpr bool EXIST = true, CHOOSE = false;
   static bool take(const Superellipsoid &shape, const Superellipsoid &first)
   {
-    return shape.p == first.p && shape.p_across == first.p_across &&
-           detail::coordinates_of(shape) != detail::Coordinates::MIXED;
+    return shape.p == first.p && shape.p_across == shape.p;
   }
 
   static FindContacts<SuperellipsoidModel, D> *of(InstructionSet set)

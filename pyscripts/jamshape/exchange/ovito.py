@@ -44,7 +44,7 @@ class _Glyph(NamedTuple):
     name: str
     """Name in `ParticlesVis.Shape`."""
     aspherical_shape: tuple[float, ...] = ()
-    roundness: float | None = None
+    roundness: tuple[float, float] | None = None
     first_turned: tuple[float, float, float, float] = _STILL
 
 
@@ -227,7 +227,7 @@ def _add_bodies(particles: Any, packing: Packing) -> None:
     particles.create_property("Aspherical Shape", data=shapes[of])
     if glyphs[0].roundness is not None:
         roundness = np.array([glyph.roundness for glyph in glyphs])[of]
-        particles.create_property("Superquadric Roundness", data=np.tile(roundness, (2, 1)).T)
+        particles.create_property("Superquadric Roundness", data=roundness)
 
 
 class _Known(NamedTuple):

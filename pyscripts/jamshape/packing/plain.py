@@ -59,7 +59,7 @@ class Bodies(NamedTuple):
                 raise ValueError(msg)
             return cls(diameters, shape.form_of_exponents(given.get(_EXPONENT, np.ones(n))))
         for parameter in shape.parameters:
-            if parameter.name not in given:
+            if parameter.name not in given and not _is_replaced(parameter, shape, given):
                 msg = f"{parameter.option} of {shape.name}s is missing, expected {parameter.meaning}, or diameters"
                 raise ValueError(msg)
         lengths = _each("size", 1.0 if size is None else size, n)
@@ -67,6 +67,13 @@ class Bodies(NamedTuple):
             msg = f"size holds {lengths.min()}, expected positive lengths"
             raise ValueError(msg)
         return cls(*shape.sizes(given, lengths))
+
+
+def _is_replaced(parameter: Parameter, shape: Shape, given: Mapping[str, Any]) -> bool:
+    """Whether a parameter may be missing: it replaces others, or is replaced."""
+    is_exponent = parameter.name == _EXPONENT
+    optional = {p.name for p in shape.parameters if p.default is None}
+    return parameter.name in optional or (is_exponent and not optional.isdisjoint(given))
 
 
 def box_of(box: Box | ArrayLike, lo: ArrayLike | None) -> Box:

@@ -39,7 +39,8 @@ class Parameter(NamedTuple):
     """A number that describes a particle beside its size, such as an aspect ratio; or a text, of subclasses."""
 
     name: str
-    default: float | str
+    default: float | str | None
+    """None for one that replaces others, and is left out where it is not given."""
     meaning: str
     option: str
     """Name on command lines and in file names."""
@@ -55,12 +56,21 @@ class Parameter(NamedTuple):
     @property
     def usual(self) -> str:
         """The default, for help."""
+        if self.default is None:
+            return "none"
         return self.default if isinstance(self.default, str) else f"{self.default:g}"
 
     @property
     def symbol(self) -> str:
         """TeX symbol, without dollars."""
-        texts = {"alpha": r"\alpha", "exponent": "p", "w1": "w_1", "w2": "w_2"}
+        texts = {
+            "alpha": r"\alpha",
+            "exponent": "p",
+            "w1": "w_1",
+            "w2": "w_2",
+            "n1": "n_1",
+            "n2": "n_2",
+        }
         return texts.get(self.name, self.name)
 
 
@@ -275,6 +285,11 @@ class Shape(ABC):
             raise ValueError(msg)
         return np.empty((len(exponent), 0))
 
+    def stored_of(self, form: FloatArray) -> tuple[str, ...]:
+        """Return the fields of a packing with the (N, K) form that files hold of each particle beside its diameters."""
+        is_exponent = self.has_exponent and form.shape[1] == 1
+        return self.stored if is_exponent or not self.has_exponent else ("form",)
+
     def check_form(self, form: FloatArray, dimension: int) -> None:
         """Raise a ValueError unless the (N, K) form, beside diameters, is one of this shape."""
         del dimension
@@ -385,7 +400,8 @@ class Shape(ABC):
 
     def label(self, parameters: Mapping[str, Any]) -> str:
         """Format parameters in TeX, for a legend."""
-        told = [f"{p.symbol}={parameters[p.name]:g}" for p in self.parameters]
+        known = (p for p in self.parameters if p.name in parameters)
+        told = [f"{p.symbol}={parameters[p.name]:g}" for p in known]
         return f"${', '.join(told)}$"
 
     def stem(self, parameters: Mapping[str, Any]) -> str:
