@@ -159,7 +159,10 @@ def test_equal_exponents_are_p_to_the_last_bit(p):
     of_p = pairs.i.replaced(p=np.full(500, p)), pairs.j.replaced(p=np.full(500, p))
     two, one = pairs.rows, [b.rows for b in of_p]
     two[0][:, -2:] = two[1][:, -2:] = 2 * p
-    for function in (_contact.superellipsoid_scales, lambda i, j: _contact.superellipsoid_contacts(i, j, 1.0)):
+    for function in (
+        _contact.superellipsoid_scales,
+        lambda i, j: _contact.superellipsoid_contacts(i, j, 1.0),
+    ):
         for name, values in function(*one).items():
             np.testing.assert_array_equal(values, function(*two)[name], err_msg=name)
 
@@ -304,7 +307,7 @@ def test_volume_and_moments_are_those_of_quadratures(n):
 @pytest.mark.parametrize("n", [(5.0, 1.6), (1.5, 6.0), (20.0, 2.0), (8.0, 4.0)])
 def test_meshes_converge_to_the_body(n):
     axes = np.array([0.7, 1.1, 1.6])
-    mesh = surface_mesh(axes, n[0] / 2, n[1] / 2, level=4)
+    mesh = surface_mesh(axes, n[0] / 2, 4, n[1] / 2)
     row = np.tile(n, (len(mesh.vertices), 1))
     np.testing.assert_allclose(gauge(mesh.vertices, axes, row), 1, rtol=1e-12)
     corner = mesh.vertices[mesh.triangles]
@@ -345,7 +348,9 @@ def test_stated_errors_hold_against_exchange(of_i, measured):
     near = pairs.i.replaced(turn=turn / np.linalg.norm(turn, axis=1)[:, None])
     along = matrix_of(pairs.j.turn)[np.arange(400), :, rng.integers(3, size=400)]
     near = near.replaced(centre=pairs.j.centre + along)
-    pairs = Pairs(near, pairs.j, pairs.n_i, pairs.n_i).at_scale(1 - 10.0 ** rng.uniform(-7, -1, 400))
+    pairs = Pairs(near, pairs.j, pairs.n_i, pairs.n_i).at_scale(
+        1 - 10.0 ** rng.uniform(-7, -1, 400)
+    )
     there = pairs.contacts(errors=True)
     back = Pairs(pairs.j, pairs.i, pairs.n_i, pairs.n_i).contacts(errors=True)
     assert np.all(there["status"] == 1)
@@ -354,4 +359,6 @@ def test_stated_errors_hold_against_exchange(of_i, measured):
     size = np.linalg.norm(there["force"], axis=1)
     measured(off=(off / size).max(), stated=np.median(stated / size))
     assert np.all(off <= stated)
-    assert np.all(np.abs(there["energy"] - back["energy"]) <= there["energy_error"] + back["energy_error"])
+    assert np.all(
+        np.abs(there["energy"] - back["energy"]) <= there["energy_error"] + back["energy_error"]
+    )

@@ -10,7 +10,12 @@ from pair_scenes import packing_of
 
 pytestmark = pytest.mark.lammps
 
-CASES = ["clump-2D-mixture", "clump-3D-mixture", "spheropolygon-2D-mixture"]
+CASES = [
+    "clump-2D-mixture",
+    "clump-3D-mixture",
+    "spheropolygon-2D-mixture",
+    "superellipsoid-3D-mixture",
+]
 SHOWN = "thermo_style custom pe pxx pxy\nthermo_modify format float %.17g\nrun 0"
 SQUARE = "0.5 -0.5 -0.5 0.5 -0.5 0.5 0.5 -0.5 0.5"  # rounding radius, corners
 
@@ -51,6 +56,8 @@ def test_numbers_in_a_file_are_those_in_the_line(name, ranks, tmp_path):
         ("spheropolygon/harmonic sides two", "0.5 -0.5 0.5 0.5 0.5 0.5 -0.5 -0.5 -0.5", "counter-clockwise"),
         ("spheropolygon/harmonic sides two", "0 -0.5 0 0.5 0", "a rounding radius"),
         ("clump/harmonic", "no_such_file.txt", "no_such_file.txt"),
+        ("superellipsoid/harmonic", "5 0.9", "n1 n2 above 1"),
+        ("superellipsoid/harmonic", "5 3 2", "n1 = n2 = 2p is the same body"),
         ("clump/harmonic", "words.txt", "found 'no' in words.txt, expected numbers alone"),
     ],
 )  # fmt: skip
@@ -73,6 +80,7 @@ def test_other_numbers_are_refused_in_a_sentence(style, numbers, message, tmp_pa
         ("spheropolygon", f"type 1 2 2 1 form {SQUARE}", f"1 1 1.0 {SQUARE}"),
         ("superellipsoid", "type 1 2 2 2 form 1.5", "1 1 1.0 1.5"),
         ("superellipsoid", "type 1 2 2 2 exponent 1.5", "1 1 1.0 1.5"),
+        ("superellipsoid", "type 1 2 2 2 form 5 1.6", "1 1 1.0 5 1.6"),
     ],
 )  # fmt: skip
 def test_random_particles_of_a_form_do_not_overlap(shape, kinds, coefficients, tmp_path):

@@ -244,7 +244,8 @@ def _known_sizes(packing: Packing) -> _Known:
     rows = zip(packing.diameters[bodies.first], packing.form[bodies.first], strict=True)
     found = [packing.shape.parameters_of(d, form) for d, form in rows]
     names = [parameter.name for parameter in packing.shape.parameters]
-    parameters = np.array([[of[name] for name in names] for of, _ in found])
+    # Those that others replace are 0.
+    parameters = np.array([[of.get(name, 0.0) for name in names] for of, _ in found])
     sizes = np.array([size for _, size in found])
     return _Known(np.round(parameters, _DIGITS)[bodies.of], sizes[bodies.of])
 

@@ -144,7 +144,7 @@ def write_data(path: PathLike, packing: Packing, density: float = 1.0) -> None:
         file.write("\nEllipsoids\n\n")
         row = ["%d"] + ["%.17g"] * 7
         if packing.shape.has_exponent and packing.form.shape[1] == len(_BLOCKS):
-            row += [f"# {_BLOCK_COMMENT}%.17g %.17g"]
+            row += [f"# {_BLOCK_COMMENT}%.17g", "%.17g"]
             ellipsoids = np.column_stack([ellipsoids, packing.form])
         elif packing.shape.has_exponent:
             row += [f"# {_EXPONENT_COMMENT}%.17g"]

@@ -53,13 +53,21 @@ class Bodies(NamedTuple):
             for name, value in parameters.items()
         }
         if diameters is not None:
-            surplus = ["size"] * (size is not None) + [name for name in given if name != _EXPONENT]
+            beside = {_EXPONENT, *(p.name for p in shape.parameters if p.default is None)}
+            surplus = ["size"] * (size is not None) + [name for name in given if name not in beside]
             if surplus:
                 msg = f"{surplus[0]} is given beside diameters, which determine it; leave one of them out"
                 raise ValueError(msg)
-            return cls(diameters, shape.form_of_exponents(given.get(_EXPONENT, np.ones(n))))
+            reduced = shape.reduced(given)
+            if set(reduced) <= {_EXPONENT}:
+                return cls(diameters, shape.form_of_exponents(reduced.get(_EXPONENT, np.ones(n))))
+            usual = {p.name: p.default for p in shape.parameters if p.default is not None}
+            return cls(diameters, shape.sizes(usual | reduced, np.ones(n))[1])
+        given = shape.reduced(given)
+        optional = {p.name for p in shape.parameters if p.default is None}
+        replaced = optional | ({_EXPONENT} if optional & set(given) else set())
         for parameter in shape.parameters:
-            if parameter.name not in given and not _is_replaced(parameter, shape, given):
+            if parameter.name not in given and parameter.name not in replaced:
                 msg = f"{parameter.option} of {shape.name}s is missing, expected {parameter.meaning}, or diameters"
                 raise ValueError(msg)
         lengths = _each("size", 1.0 if size is None else size, n)
@@ -67,13 +75,6 @@ class Bodies(NamedTuple):
             msg = f"size holds {lengths.min()}, expected positive lengths"
             raise ValueError(msg)
         return cls(*shape.sizes(given, lengths))
-
-
-def _is_replaced(parameter: Parameter, shape: Shape, given: Mapping[str, Any]) -> bool:
-    """Whether a parameter may be missing: it replaces others, or is replaced."""
-    is_exponent = parameter.name == _EXPONENT
-    optional = {p.name for p in shape.parameters if p.default is None}
-    return parameter.name in optional or (is_exponent and not optional.isdisjoint(given))
 
 
 def box_of(box: Box | ArrayLike, lo: ArrayLike | None) -> Box:

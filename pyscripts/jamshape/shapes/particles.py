@@ -248,7 +248,7 @@ def _with_defaults(shape: Shape, parameters: Mapping[str, Any]) -> dict[str, Any
             raise ValueError(msg)
     chosen = known | given
     present = (p for p in shape.parameters if chosen[p.name] is not None)
-    return {p.name: p.read(chosen[p.name]) for p in present}
+    return shape.reduced({p.name: p.read(chosen[p.name]) for p in present})
 
 
 @dataclass(frozen=True)

@@ -339,6 +339,16 @@ class Shape(ABC):
             If a parameter is out of its range.
         """
 
+    def reduced(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
+        """Return parameters without those that others replace.
+
+        Raises
+        ------
+        ValueError
+            If they exclude each other.
+        """
+        return dict(parameters)
+
     @abstractmethod
     def parameters_of(
         self, diameters: FloatArray, form: FloatArray

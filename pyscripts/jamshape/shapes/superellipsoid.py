@@ -36,20 +36,6 @@ def halves(form: FloatArray) -> tuple[float, float]:
     return float(form[0]), float(form[0])
 
 
-def _form_of(n: int, exponent: Any, n1: Any, n2: Any) -> FloatArray:
-    """Return the form of n bodies with p, or with n1 and n2."""
-    if n1 is None and n2 is None:
-        return np.full((n, 1), np.reshape(1.0 if exponent is None else exponent, (-1, 1)))
-    if n1 is None or n2 is None:
-        found, other = ("n1", "n2") if n2 is None else ("n2", "n1")
-        msg = f"{found} is given without {other}, expected both, or p alone"
-        raise ValueError(msg)
-    if np.any(np.not_equal(1.0 if exponent is None else exponent, 1.0)):
-        msg = "p is given beside n1 and n2, which replace it; leave p out"
-        raise ValueError(msg)
-    return np.column_stack([np.full(n, n1), np.full(n, n2)])
-
-
 class Superellipsoid(Shape):
     """Superellipsoids ``|x/a|^2p + |y/b|^2p + |z/c|^2p = 1`` (Yuan et al. 2019, Eqs. 1 and 2).
 
@@ -118,18 +104,34 @@ class Superellipsoid(Shape):
     ) -> tuple[FloatArray, FloatArray]:
         """See `Shape.sizes`."""
         axes = axes_from(parameters["w1"], parameters["w2"])
-        given = [parameters.get(name) for name in ("exponent", "n1", "n2")]
-        return size[:, None] * (2 * axes), _form_of(len(size), *given)
+        names = ("n1", "n2") if "n1" in parameters else ("exponent",)
+        form = [np.full(len(size), parameters[name]) for name in names]
+        return size[:, None] * (2 * axes), np.column_stack(form)
+
+    def reduced(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
+        """See `Shape.reduced`: n1 and n2 replace p."""
+        given = [name for name in ("n1", "n2") if name in parameters]
+        if not given:
+            return dict(parameters)
+        if len(given) < TWO_EXPONENTS:
+            other = "n2" if given == ["n1"] else "n1"
+            msg = f"{given[0]} is given without {other}, expected both, or p alone"
+            raise ValueError(msg)
+        if np.any(np.not_equal(parameters.get("exponent", 1.0), 1.0)):
+            msg = "p is given beside n1 and n2, which replace it; leave p out"
+            raise ValueError(msg)
+        return {name: value for name, value in parameters.items() if name != "exponent"}
 
     def parameters_of(
         self, diameters: FloatArray, form: FloatArray
     ) -> tuple[dict[str, float], float]:
-        """See `Shape.parameters_of`; in units of the shortest semi-axis, or of that along x of bodies with n1 and n2."""
-        if len(form) == TWO_EXPONENTS:
+        """See `Shape.parameters_of`; in units of the shortest semi-axis, or of that along x if n1 and n2 differ."""
+        p, p_across = halves(form)
+        if p != p_across:
             a, b, c = (float(axis) for axis in diameters / 2)
             return {"w1": a / b, "w2": c / b, "n1": float(form[0]), "n2": float(form[1])}, a
         a, b, c = (float(axis) for axis in np.sort(diameters) / 2)
-        return {"exponent": float(form[0]), "w1": a / b, "w2": c / b}, a
+        return {"exponent": p, "w1": a / b, "w2": c / b}, a
 
     def described(
         self, diameters: FloatArray, form: FloatArray, dimension: int
@@ -162,7 +164,8 @@ class Superellipsoid(Shape):
 
     def surface(self, diameters: FloatArray, form: FloatArray, level: int = 3) -> SurfaceMesh:
         """See `Shape.surface`."""
-        return surface_mesh(diameters / 2, *halves(form), level=level)
+        p, p_across = halves(form)
+        return surface_mesh(diameters / 2, p, level, p_across)
 
     def solid(self, diameters: FloatArray, form: FloatArray) -> Superquadric:
         """See `Shape.solid`."""

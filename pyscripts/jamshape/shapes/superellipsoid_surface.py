@@ -21,7 +21,7 @@ _NOTHING = -600.0
 
 
 def surface_mesh(
-    semi_axes: ArrayLike, p: float, p_across: float | None = None, *, level: int = 3
+    semi_axes: ArrayLike, p: float, level: int = 3, p_across: float | None = None
 ) -> SurfaceMesh:
     """Cover a superellipsoid evenly with triangles.
 
@@ -35,10 +35,10 @@ def surface_mesh(
     ----------
     semi_axes : (3,) array_like, [length]
     p : float
-    p_across : float, optional
-        Half the exponent of sections across z; p by default.
     level : int
         Each level makes four triangles of one: 48, 192, 768, 3072 ...
+    p_across : float, optional
+        Half the exponent of sections across z; p by default.
 
     Returns
     -------
