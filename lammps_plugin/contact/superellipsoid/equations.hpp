@@ -122,9 +122,9 @@ template <class T> Truth<T> is_well_posed(const Matrix<3, T> &a)
   return (trace * trace < T(WELL_POSED) * minors) & (trace * minors < T(WELL_POSED) * determinant);
 }
 
-/// How the equations represent a body: by the normal n of a plane, its support function being
-/// smooth, by a point of its surface, its gauge being smooth, or, if neither is since one exponent
-/// is below 2 and the other above, by what is smooth of each (see mixed.hpp).
+/// Representation of a body in the equations: by the normal n of a plane, its support function
+/// being smooth, by a point of its surface, its gauge being smooth, or, if neither is since one
+/// exponent is below 2 and the other above, by coordinates of both kinds (see mixed.hpp).
 enum class Coordinates { NORMAL, POINT, MIXED };
 
 template <class Body> Coordinates coordinates_of(const Body &body)

@@ -99,8 +99,8 @@ template <int D, class T> struct PowerOff {
   T outer() const { return pow(rho(), power.axis); }
   T share(int k) const { return rho() > 0 ? pow(x[k] / rho(), power.across) : T(0); }
 
-  /// Of a product of which the second factor, at most 1, is a power of a ratio. A norm changes by
-  /// at most the sum of the changes.
+  /// Bound for a product of which the second factor, at most 1, is a power of a ratio. A norm
+  /// changes by at most the sum of the changes.
   T change_across(int k) const
   {
     const T off_rho = off[0] + off[1], least = rho() - off_rho;

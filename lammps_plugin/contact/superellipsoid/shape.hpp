@@ -72,7 +72,8 @@ struct Superellipsoid {
   }
 
  private:
-  /// By Hoelder's inequality for p > 1, the longest semi-axis otherwise.
+  /// Largest distance for one exponent: by Hoelder's inequality for p > 1, the longest semi-axis
+  /// otherwise.
   template <int M> static double farthest(const double *axes, double exponent)
   {
     double longest = 0.0, sum = 0.0;

@@ -99,11 +99,11 @@ def options_of() -> ArgumentParser:
         parser.add_argument(
             f"--{shape.name}",
             type=float,
-            nargs=len(shape.parameters),
+            nargs=len(shape.needed),
             action="append",
             default=[],
-            metavar=tuple(p.option.upper() for p in shape.parameters),
-            help=f"{', '.join(p.meaning for p in shape.parameters)}; may be given several times",
+            metavar=tuple(p.option.upper() for p in shape.needed),
+            help=f"{', '.join(p.meaning for p in shape.needed)}; may be given several times",
         )
     parser.add_argument(
         "--samples", type=int, default=6, help="samples of each, with one seed each (6)"
@@ -140,7 +140,7 @@ def particles(options: Namespace) -> list[Particle]:
     shape = shape_named(options.shape or DEFAULT)
     found = [particle_of(shape, {"alpha": alpha}) for alpha in options.alpha]
     for other in SHAPES.values():
-        names = [p.name for p in other.parameters]
+        names = [p.name for p in other.needed]
         given = getattr(options, other.name)
         found += [particle_of(other, dict(zip(names, v, strict=True))) for v in given]
     if options.kind:
@@ -153,7 +153,7 @@ def particles(options: Namespace) -> list[Particle]:
 def particle_of(shape: Shape, parameters: dict[str, float]) -> Particle:
     """Name particles of a shape."""
     told, asked = ["--shape", shape.name], [f"--{shape.name}"]
-    for parameter in shape.parameters:
+    for parameter in shape.needed:
         number = repr(parameters[parameter.name])
         told += [f"--{parameter.option}", number]
         asked.append(number)

@@ -53,7 +53,7 @@ class Bodies(NamedTuple):
             for name, value in parameters.items()
         }
         if diameters is not None:
-            beside = {_EXPONENT, *(p.name for p in shape.parameters if p.default is None)}
+            beside = {_EXPONENT, *(p.name for p in set(shape.parameters) - set(shape.needed))}
             surplus = ["size"] * (size is not None) + [name for name in given if name not in beside]
             if surplus:
                 msg = f"{surplus[0]} is given beside diameters, which determine it; leave one of them out"
@@ -61,13 +61,12 @@ class Bodies(NamedTuple):
             reduced = shape.reduced(given)
             if set(reduced) <= {_EXPONENT}:
                 return cls(diameters, shape.form_of_exponents(reduced.get(_EXPONENT, np.ones(n))))
-            usual = {p.name: p.default for p in shape.parameters if p.default is not None}
+            usual = {p.name: p.default for p in shape.needed}
             return cls(diameters, shape.sizes(usual | reduced, np.ones(n))[1])
         given = shape.reduced(given)
-        optional = {p.name for p in shape.parameters if p.default is None}
-        replaced = optional | ({_EXPONENT} if optional & set(given) else set())
-        for parameter in shape.parameters:
-            if parameter.name not in given and parameter.name not in replaced:
+        needed = shape.reduced({p.name: p.default for p in shape.needed} | given)
+        for parameter in shape.needed:
+            if parameter.name in needed and parameter.name not in given:
                 msg = f"{parameter.option} of {shape.name}s is missing, expected {parameter.meaning}, or diameters"
                 raise ValueError(msg)
         lengths = _each("size", 1.0 if size is None else size, n)

@@ -237,6 +237,11 @@ class Shape(ABC):
         return hash(type(self))
 
     @property
+    def needed(self) -> tuple[Parameter, ...]:
+        """Parameters without those that replace others where they are given."""
+        return tuple(p for p in self.parameters if p.default is not None)
+
+    @property
     def compiled_name(self) -> str:
         """Name of its class in `jamshape._contact`, and of the function that makes particles."""
         return f"{self.name.capitalize()}s"

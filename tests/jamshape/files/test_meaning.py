@@ -298,7 +298,7 @@ def test_six_digits_are_said_to_cost_overlaps(path):
 )
 def test_what_we_write_says_what_it_holds(path, name, dimension):
     shape = SHAPES[name]
-    usual = {p.name: p.read(p.default) for p in shape.parameters if p.default is not None}
+    usual = {p.name: p.read(p.default) for p in shape.needed}
     diameters, form = shape.sizes(usual, np.array([1.0, 1.3]))
     if shape.has_exponent:
         form = np.array([[1.5], [2.5]])
