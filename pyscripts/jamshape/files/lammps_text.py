@@ -109,7 +109,9 @@ class _Frame(NamedTuple):
     boundary: str = "pp pp pp"
 
 
-def write_data(path: PathLike, packing: Packing, density: float = 1.0) -> None:
+def write_data(
+    path: PathLike, packing: Packing, density: float = 1.0, *, blocks: bool = False
+) -> None:
     """Write a data file for ``atom_style ellipsoid``; `path` is replaced only when writing is complete.
 
     Parameters
@@ -120,6 +122,9 @@ def write_data(path: PathLike, packing: Packing, density: float = 1.0) -> None:
         from -0.5 to 0.5 in z. Shape, law and exponents go along as comments.
     density : float, [mass / length^3]
         Mass density, from which LAMMPS computes masses.
+    blocks : bool
+        Write n1 and n2 of superellipsoids behind each row of Ellipsoids, for ``atom_style ellipsoid superellipsoid`` of
+        LAMMPS from 2026 on; other versions do not read such rows.
 
     Raises
     ------
@@ -143,9 +148,10 @@ def write_data(path: PathLike, packing: Packing, density: float = 1.0) -> None:
         np.savetxt(file, atoms, fmt=["%d"] * 3 + ["%.17g"] * 4 + ["%d"] * 3)
         file.write("\nEllipsoids\n\n")
         row = ["%d"] + ["%.17g"] * 7
-        if packing.shape.has_exponent and packing.form.shape[1] == len(_BLOCKS):
-            row += [f"# {_BLOCK_COMMENT}%.17g", "%.17g"]
-            ellipsoids = np.column_stack([ellipsoids, packing.form])
+        if packing.shape.has_exponent and (blocks or packing.form.shape[1] == len(_BLOCKS)):
+            row += ["%.17g" if blocks else f"# {_BLOCK_COMMENT}%.17g", "%.17g"]
+            both = packing.shape.widened(packing.form, len(_BLOCKS))
+            ellipsoids = np.column_stack([ellipsoids, both])
         elif packing.shape.has_exponent:
             row += [f"# {_EXPONENT_COMMENT}%.17g"]
             ellipsoids = np.column_stack([ellipsoids, packing.exponent])

@@ -428,6 +428,15 @@ def test_two_exponents_survive_data_files_and_dumps_to_the_last_bit(path, dimens
     np.testing.assert_array_equal(found.form, expected.form)
 
 
+@pytest.mark.parametrize("make", [bodies, with_two_exponents])
+def test_rows_for_lammps_from_2026_on_have_both_exponents(path, make):
+    expected = make(3).with_(step=0, time=0.0)
+    write_data(path, expected, blocks=True)
+    rows = path.read_text().partition("Ellipsoids\n\n")[2].splitlines()
+    assert all(len(row.split()) == 10 and "#" not in row for row in rows)
+    assert_identical(read_data(path), expected)
+
+
 @pytest.mark.parametrize("columns", [["block1", "block2"], ["c_block1", "c_block2"], ROUNDNESS])
 def test_dumps_of_others_tell_two_exponents(path, columns):
     expected = with_two_exponents(3)
