@@ -48,7 +48,7 @@ _OTHERS = (
 
 def with_three_axes() -> Shape:
     """Find the shape with an exponent and two axis ratios."""
-    names = (tuple(p.name for p in shape.parameters) for shape in SHAPES.values())
+    names = (tuple(p.name for p in shape.needed) for shape in SHAPES.values())
     return next(shape for shape, own in zip(SHAPES.values(), names, strict=True) if own == NEEDS)
 
 

@@ -416,7 +416,8 @@ template <int D, class S> class PowerNorm {
   template <bool CURVED> struct Nested : FlatNorm<D, S> {
     T across[2], bend_across;
 
-    Nested(const PowerNorm &of, const Along &along)
+    // Not inlined, so that loops over bodies with one exponent stay small.
+    [[gnu::noinline]] Nested(const PowerNorm &of, const Along &along)
     {
       const Exponent<Power> e_across(of.e_across), across_less(of.e_across - 1);
       const T scale_across[2] = {of.scale[0], of.scale[1]}, scale_outer[2] = {T(1.0), of.scale[2]};

@@ -344,6 +344,12 @@ class Shape(ABC):
             If a parameter is out of its range.
         """
 
+    def told(self, known: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the parameters of a particle among known values; none unless they are complete."""
+        own = {p.name: known[p.name] for p in self.parameters if p.name in known}
+        complete = self.reduced({p.name: p.default for p in self.needed} | own)
+        return own if own.keys() == complete.keys() else {}
+
     def reduced(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
         """Return parameters without those that others replace.
 
