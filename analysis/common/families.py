@@ -60,7 +60,7 @@ _OTHERS = (
 
 def with_three_axes() -> Shape:
     """Find the shape with an exponent and two axis ratios."""
-    names = (tuple(p.name for p in shape.parameters) for shape in SHAPES.values())
+    names = (tuple(p.name for p in shape.needed) for shape in SHAPES.values())
     return next(shape for shape, own in zip(SHAPES.values(), names, strict=True) if own == NEEDS)
 
 
@@ -85,7 +85,7 @@ def is_axisymmetric(system: System) -> bool:
 def family(system: System) -> str:
     """Name the family of shapes."""
     shape = SHAPES[system.shape]
-    if {parameter.name for parameter in shape.parameters} <= dict(system.parameters).keys():
+    if shape.told(dict(system.parameters)):
         return shape.family(dict(system.parameters), system.dimension)
     return f"{system.shape}s"
 

@@ -38,6 +38,7 @@ from jamshape.shapes.single_pairs import superellipsoid_contacts
 HERE = Path(__file__).parent
 SOURCES = HERE.parents[1] / "lammps_plugin"
 BLOCK = 5000
+_COLUMNS_OF_P = 11  # in 3D
 SAID = 1e-12
 NAMES = ("energy", "force", "torque")
 PRECISIONS = {"double": False, "long double": True}
@@ -112,7 +113,8 @@ def contacts_of(couples: Couples, *, extended: bool) -> tuple[Contacts, FloatArr
 def reference(program: Path, couples: Couples, begin: FloatArray) -> Contacts:
     """Solve pairs in 33 digits, from normals and points beside the solution."""
     D = couples.dimension
-    pairs = np.ascontiguousarray(np.hstack([couples.i, couples.j, begin]))
+    rows = [_with_two_exponents(rows) for rows in (couples.i, couples.j)]
+    pairs = np.ascontiguousarray(np.hstack([*rows, begin]))
     done = subprocess.run(
         [program, str(D)], input=pairs.tobytes(), stdout=subprocess.PIPE, check=True
     )
@@ -120,6 +122,13 @@ def reference(program: Path, couples: Couples, begin: FloatArray) -> Contacts:
     split = numbers[:, :-3].reshape(len(pairs), -1, 2).astype(np.longdouble).sum(axis=2)
     force, torque = split[:, 1 : 1 + D], split[:, 1 + D :].reshape(len(pairs), 2, -1)
     return Contacts(split[:, 0], force, torque, numbers[:, -3:])
+
+
+def _with_two_exponents(rows: FloatArray) -> FloatArray:
+    """Rows of bodies in 3D with n1 = n2 = 2p in place of p."""
+    if rows.shape[1] != _COLUMNS_OF_P:
+        return rows
+    return np.hstack([rows[:, :-1], np.repeat(2 * rows[:, -1:], 2, axis=1)])
 
 
 @dataclass(frozen=True)

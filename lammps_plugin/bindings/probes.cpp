@@ -31,10 +31,11 @@ void require_body(bool condition, std::size_t n, const char *otherwise)
 /// axis.
 struct SpherocylinderRows {
   using Model = SpherocylinderModel;
-  static constexpr std::size_t COLUMNS_2D = 6, COLUMNS_3D = 8;
+  static constexpr std::size_t COLUMNS_2D = 6, COLUMNS_3D = 8, MOST_COLUMNS = 8;
   static constexpr const char *RULE = "6 (2D) or 8 (3D): centre, axis, half_length, radius.";
 
-  template <int D> static SpherocylinderBody<D> read(const double *row, std::size_t n)
+  template <int D>
+  static SpherocylinderBody<D> read(const double *row, std::size_t n, std::size_t /*columns*/)
   {
     const double half_length = row[2 * D], radius = row[2 * D + 1];
     require_body(half_length >= 0.0 && std::isfinite(half_length) && radius > 0.0 &&
@@ -48,33 +49,35 @@ struct SpherocylinderRows {
 
 struct SuperellipsoidRows {
   using Model = SuperellipsoidModel;
-  static constexpr std::size_t COLUMNS_2D = 6, COLUMNS_3D = 11;
+  static constexpr std::size_t COLUMNS_2D = 6, COLUMNS_3D = 11, MOST_COLUMNS = 12;
   static constexpr const char *RULE =
-      "6 (2D: centre, angle, semi-axes, p) or 11 (3D: centre, quaternion, semi-axes, p).";
+      "6 (2D: centre, angle, semi-axes, p) or 11 (3D: centre, quaternion, semi-axes, p) or 12 (n1, "
+      "n2 in place of p).";
 
   /// The two bodies of a pair in extended precision.
   template <int D>
   static PosedPair<Model, D, long double> in_long(const double *row_i, const double *row_j,
-                                                  const Model::Law &law)
+                                                  std::size_t columns, const Model::Law &law)
   {
     Vec<D, long double> r;
     for (int k = 0; k < D; ++k) r[k] = static_cast<long double>(row_i[k]) - row_j[k];
-    return {*shape<D>(row_i),
-            *shape<D>(row_j),
+    return {*shape<D>(row_i, columns),
+            *shape<D>(row_j, columns),
             r,
             orientation<D, long double>(row_i + D),
             orientation<D, long double>(row_j + D),
             law};
   }
 
-  template <int D> static SuperellipsoidBody<D> read(const double *row, std::size_t n)
+  template <int D>
+  static SuperellipsoidBody<D> read(const double *row, std::size_t n, std::size_t columns)
   {
     const double *turn = row + D;
-    const auto shape = SuperellipsoidRows::shape<D>(row);
+    const auto shape = SuperellipsoidRows::shape<D>(row, columns);
     require_body(
         shape.has_value(), n,
         "is not a valid shape: a superellipsoid has positive semi-axes and an exponent p above "
-        "0.5.");
+        "0.5, or n1 and n2 above 1.");
     require_body(are_finite(row, D) && is_turn<D>(turn), n,
                  "is without a finite pose: its centre or orientation is not finite, or the "
                  "quaternion zero.");
@@ -85,10 +88,11 @@ struct SuperellipsoidRows {
   }
 
  private:
-  template <int D> static std::optional<Superellipsoid> shape(const double *row)
+  template <int D>
+  static std::optional<Superellipsoid> shape(const double *row, std::size_t columns)
   {
     const double *axes = row + D + (D == 2 ? 1 : 4);
-    const auto form = Model::Form::from({axes[D]}, D);
+    const auto form = Model::Form::from({axes + D, row + columns}, D);
     if (!form) return std::nullopt;
     return Model::shape_from({{axes[0], axes[1], D == 2 ? axes[1] : axes[D - 1]}}, *form);
   }
@@ -109,7 +113,8 @@ template <class Rows> class BodyPairs {
     require(i.shape(0) == j.shape(0) && i.shape(1) == j.shape(1),
             "bodies_i and bodies_j differ in shape, expected one row each a pair.");
     const std::size_t columns = i.shape(1);
-    require(columns == Rows::COLUMNS_2D || columns == Rows::COLUMNS_3D,
+    require(columns == Rows::COLUMNS_2D ||
+                (columns >= Rows::COLUMNS_3D && columns <= Rows::MOST_COLUMNS),
             "bodies have " + std::to_string(columns) + " columns, expected " + Rows::RULE);
   }
 
@@ -117,6 +122,7 @@ template <class Rows> class BodyPairs {
   const double *row_j(std::size_t n) const { return j.data() + n * j.shape(1); }
   int dimension() const { return i.shape(1) == Rows::COLUMNS_2D ? 2 : 3; }
   std::size_t size() const { return i.shape(0); }
+  std::size_t columns() const { return i.shape(1); }
   template <int D> auto first(std::size_t n) const { return at<D>(i, n); }
   template <int D> auto second(std::size_t n) const { return at<D>(j, n); }
 
@@ -125,7 +131,7 @@ template <class Rows> class BodyPairs {
 
   template <int D> static auto at(const Bodies &bodies, std::size_t n)
   {
-    return Rows::template read<D>(bodies.data() + n * bodies.shape(1), n);
+    return Rows::template read<D>(bodies.data() + n * bodies.shape(1), n, bodies.shape(1));
   }
 };
 
@@ -181,7 +187,7 @@ nb::dict superellipsoid_contacts_in(const BodyPairs<SuperellipsoidRows> &pairs,
   for (std::size_t n = 0; n < pairs.size(); ++n) {
     const auto i = pairs.first<D>(n), j = pairs.second<D>(n);
     const auto longer = [&] {
-      return SuperellipsoidRows::in_long<D>(pairs.row_i(n), pairs.row_j(n), law);
+      return SuperellipsoidRows::in_long<D>(pairs.row_i(n), pairs.row_j(n), pairs.columns(), law);
     };
     const auto contact = extended ? rounded(contact_at<Model, D, long double>(longer()))
                                   : to_its_digits<Model, D>(contact_of(i, j, law), longer);
@@ -209,7 +215,7 @@ template <int D>
 FoundTangency<D, double> tangency_in_long(const BodyPairs<SuperellipsoidRows> &pairs, std::size_t n)
 {
   using Long = long double;
-  const auto pair = SuperellipsoidRows::in_long<D>(pairs.row_i(n), pairs.row_j(n),
+  const auto pair = SuperellipsoidRows::in_long<D>(pairs.row_i(n), pairs.row_j(n), pairs.columns(),
                                                    law_of<SuperellipsoidModel>(1.0, {1}));
   const PosedBodies<SuperellipsoidModel, D, Long> bodies(pair);
   const auto longer =
@@ -386,7 +392,8 @@ void export_probes(nb::module_ &m)
   m.def("superellipsoid_contacts", &superellipsoid_contacts, "bodies_i"_a, "bodies_j"_a,
         "epsilon"_a, "extended"_a = false, "errors"_a = false,
         "Contacts of M pairs. Bodies are (M, 6) in 2D: centre, angle, two semi-axes, p; (M, 11)\n"
-        "in 3D: centre, quaternion w i j k, three semi-axes, p. Returns the arrays of\n"
+        "in 3D: centre, quaternion w i j k, three semi-axes, p, or (M, 12) with n1, n2 in place\n"
+        "of p. Returns the arrays of\n"
         "Superellipsoids.contacts, of all M pairs (status 0: apart). Of a bond 1 -\n"
         "distance/reach is 1 - eta^2.");
   m.def("superellipsoid_scales", &superellipsoid_scales, "bodies_i"_a, "bodies_j"_a,

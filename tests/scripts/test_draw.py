@@ -38,7 +38,7 @@ def mixture(shape, dimension):
     species = 1 + np.arange(n) % 2
     diameters, form = np.empty((n, 3)), None
     for kind, size in ((1, 1.0), (2, 1.3)):
-        known = {p.name: p.default for p in SHAPES[shape].parameters}
+        known = {p.name: p.default for p in SHAPES[shape].needed}
         known |= {"w2": 2.0} if "w2" in known else {}
         known |= {"alpha": 1.0 * kind} if "alpha" in known else {}
         own = species == kind

@@ -52,7 +52,8 @@ def alike(found, expected, rounding=1e-12):
 def test_parameters_make_particles_that_fit_and_come_back(case):
     shape = SHAPES[case.shape]
     assert shape_named(shape.name) is shape
-    parameters = {p.name: p.default for p in shape.parameters} | examples(case.shape)[case.which]
+    usual = {p.name: p.default for p in shape.needed}
+    parameters = shape.reduced(usual | examples(case.shape)[case.which])
     size = np.array([0.3, 1.0, 7.0])
     diameters, form = shape.sizes(parameters, size)
     assert diameters.shape == (3, 3)
@@ -81,8 +82,8 @@ def test_parameters_make_particles_that_fit_and_come_back(case):
 @pytest.mark.parametrize("name", SHAPES)
 def test_names_of_files_and_labels_tell_parameters_apart(name):
     shape = SHAPES[name]
-    defaults = {p.name: p.default for p in shape.parameters}
-    sets = [defaults | given for given in examples(name)]
+    defaults = {p.name: p.default for p in shape.needed}
+    sets = [shape.reduced(defaults | given) for given in examples(name)]
     for text in (shape.stem, shape.label):
         assert len({text(parameters) for parameters in sets}) == len(sets)
     assert all(not set("/ \\") & set(shape.stem(parameters)) for parameters in sets)
@@ -276,9 +277,10 @@ def test_mixtures_hold_all_examples(case):
         found.append(told[0])
         for one in told:
             assert alike(one, told[0])
-    defaults = {p.name: p.default for p in SHAPES[case.shape].parameters}
+    shape = SHAPES[case.shape]
+    defaults = {p.name: p.default for p in shape.needed}
     for given in examples(case.shape):
-        assert any(alike(one, defaults | given) for one in found)
+        assert any(alike(one, shape.reduced(defaults | given)) for one in found)
 
 
 # --- random starts -------------------------------------------------------------------------------

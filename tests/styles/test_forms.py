@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
 import pytest
 from lammps_runs import before_box, error_of, load_plugin, run_lmp, run_lmp_well, scene
 from pair_scenes import packing_of
 
 pytestmark = pytest.mark.lammps
 
-CASES = ["clump-2D-mixture", "clump-3D-mixture", "spheropolygon-2D-mixture"]
+CASES = [
+    "clump-2D-mixture",
+    "clump-3D-mixture",
+    "spheropolygon-2D-mixture",
+    "superellipsoid-3D-mixture",
+]
 SHOWN = "thermo_style custom pe pxx pxy\nthermo_modify format float %.17g\nrun 0"
 SQUARE = "0.5 -0.5 -0.5 0.5 -0.5 0.5 0.5 -0.5 0.5"  # rounding radius, corners
 
@@ -51,6 +57,8 @@ def test_numbers_in_a_file_are_those_in_the_line(name, ranks, tmp_path):
         ("spheropolygon/harmonic sides two", "0.5 -0.5 0.5 0.5 0.5 0.5 -0.5 -0.5 -0.5", "counter-clockwise"),
         ("spheropolygon/harmonic sides two", "0 -0.5 0 0.5 0", "a rounding radius"),
         ("clump/harmonic", "no_such_file.txt", "no_such_file.txt"),
+        ("superellipsoid/harmonic", "5 0.9", "n1 n2 above 1"),
+        ("superellipsoid/harmonic", "5 3 2", "n1 = n2 = 2p is the same body"),
         ("clump/harmonic", "words.txt", "found 'no' in words.txt, expected numbers alone"),
     ],
 )  # fmt: skip
@@ -73,6 +81,7 @@ def test_other_numbers_are_refused_in_a_sentence(style, numbers, message, tmp_pa
         ("spheropolygon", f"type 1 2 2 1 form {SQUARE}", f"1 1 1.0 {SQUARE}"),
         ("superellipsoid", "type 1 2 2 2 form 1.5", "1 1 1.0 1.5"),
         ("superellipsoid", "type 1 2 2 2 exponent 1.5", "1 1 1.0 1.5"),
+        ("superellipsoid", "type 1 2 2 2 form 5 1.6", "1 1 1.0 5 1.6"),
     ],
 )  # fmt: skip
 def test_random_particles_of_a_form_do_not_overlap(shape, kinds, coefficients, tmp_path):
@@ -89,3 +98,39 @@ def test_random_particles_of_a_form_do_not_overlap(shape, kinds, coefficients, t
     )
     assert "Created 40 particles at random" in done
     assert float(shown(done)[0]) == 0.0
+
+
+@pytest.mark.parametrize("exponents", ["5 1.6", "1.5 6", "20 2"])
+def test_energy_is_conserved_by_motion_with_inertia(exponents, tmp_path, measured):
+    """Its fluctuation falls with the time step: as its square, or more slowly where edges, which are sharp, touch."""
+
+    def fluctuation(steps):
+        done = run_lmp_well(
+            f"""
+            {before_box(3)}
+            {load_plugin()}
+            create_random superellipsoid 40 0.3 3 type 1 1 1 1.4 form {exponents}
+            pair_style superellipsoid/harmonic
+            pair_coeff 1 1 1.0 {exponents}
+            velocity all create 0.02 7 loop all
+            fix motion all nve/asphere
+            compute turn all erotate/asphere
+            timestep {8.0 / steps}
+            thermo {steps // 40}
+            thermo_style custom step pe ke c_turn
+            thermo_modify format float %.17g norm no
+            run {steps}""",
+            tmp_path,
+        )
+        rows = re.search(r"Step .*\n((?:\s*\d+(?: +\S+){3} *\n)+)", done)[1].splitlines()
+        push, move, spin = np.array([row.split()[1:] for row in rows], float).T
+        total = push + move + spin
+        assert len(total) == 41
+        assert push.max() > 1e-3 * total[0]  # they collide
+        assert spin[-1] > 1e-2 * total[0]  # and turn
+        return np.ptp(total) / total[0]
+
+    coarse, fine = fluctuation(1600), fluctuation(25600)
+    measured(coarse=coarse, fine=fine)
+    assert fine < 2e-5
+    assert fine < coarse / 8

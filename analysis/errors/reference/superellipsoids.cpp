@@ -3,9 +3,10 @@
 //
 //     superellipsoids 2|3 < pairs > contacts
 //
-// A pair is the rows of both bodies (as `superellipsoid_contacts` takes them) and a normal and a
-// point of i (from its centre) to begin at, in doubles. A contact is energy, force, torque_i and
-// torque_j, each number a double and its rest, and three doubles: bounds of the errors of these.
+// A pair is the rows of both bodies (as `superellipsoid_contacts` takes them, in 3D with two
+// exponents) and a normal and a point of i (from its centre) to begin at, in doubles. A contact is
+// energy, force, torque_i and torque_j, each number a double and its rest, and three doubles:
+// bounds of the errors of these.
 
 #include "contact/errors.hpp"
 #include "contact/superellipsoid/superellipsoid.hpp"
@@ -20,13 +21,15 @@ namespace jamshape {
 namespace {
 
 template <int D> constexpr int TURNS = D == 2 ? 1 : 4;
-template <int D> constexpr int COLUMNS = 2 * D + TURNS<D> + 1;
+template <int D> constexpr int EXPONENTS = D == 2 ? 1 : 2;
+template <int D> constexpr int COLUMNS = 2 * D + TURNS<D> + EXPONENTS<D>;
 
 template <int D> SuperellipsoidBody<D, Quad> body_of(const double *row)
 {
   const double *const turn = row + D, *const axes = turn + TURNS<D>;
-  const Superellipsoid shape{{{axes[0], axes[1], D == 2 ? axes[1] : axes[D - 1]}}, axes[D]};
-  auto body = SuperellipsoidModel::body<D, Quad>(shape);
+  const Vec<3> semi_axes{{axes[0], axes[1], D == 2 ? axes[1] : axes[D - 1]}};
+  const auto form = *SuperellipsoidForm::from({axes + D, axes + D + EXPONENTS<D>}, D);
+  auto body = SuperellipsoidModel::body<D, Quad>(*superellipsoid_from(semi_axes, form));
   for (int k = 0; k < D; ++k) body.centre[k] = row[k];
   const Quad half = Quad(0.5) * Quad(turn[0]), zero = 0.0;
   QuaternionOf<Quad> q{cos(half), zero, zero, sin(half)};

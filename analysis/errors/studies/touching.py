@@ -30,7 +30,8 @@ class Couples(NamedTuple):
     def largest_axis(self) -> FloatArray:
         """(M,) the largest semi-axis of both."""
         D = self.dimension
-        return np.asarray(np.maximum(*(b[:, -1 - D : -1].max(axis=1) for b in self)))
+        first = D + (1 if D == 2 else 4)  # behind centre and rotation
+        return np.asarray(np.maximum(*(b[:, first : first + D].max(axis=1) for b in self)))
 
 
 class Bodies(NamedTuple):

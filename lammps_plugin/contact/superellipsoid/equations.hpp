@@ -122,28 +122,43 @@ template <class T> Truth<T> is_well_posed(const Matrix<3, T> &a)
   return (trace * trace < T(WELL_POSED) * minors) & (trace * minors < T(WELL_POSED) * determinant);
 }
 
-/// Whether the equations represent a body by the normal n of a plane, rather than by a point of its
-/// surface.
-inline bool is_by_normal(double p) { return p <= 1.0; }
+/// Representation of a body in the equations: by the normal n of a plane, its support function
+/// being smooth, by a point of its surface, its gauge being smooth, or, if neither is since one
+/// exponent is below 2 and the other above, by coordinates of both kinds (see mixed.hpp).
+enum class Coordinates { NORMAL, POINT, MIXED };
+
+template <class Body> Coordinates coordinates_of(const Body &body)
+{
+  if (body.p <= 1.0 && body.p_across <= 1.0) return Coordinates::NORMAL;
+  return body.p >= 1.0 && body.p_across >= 1.0 ? Coordinates::POINT : Coordinates::MIXED;
+}
+template <class Body> bool is_by_normal(const Body &body)
+{
+  return coordinates_of(body) == Coordinates::NORMAL;
+}
 
 template <class T> T smooth_exponent(double p)
 {
-  return is_by_normal(p) ? 1 / (2 * T(p) - 1) : 2 * T(p) - 1;
+  return p <= 1.0 ? 1 / (2 * T(p) - 1) : 2 * T(p) - 1;
+}
+template <class T, class Body> Powers<T> smooth_powers(const Body &body)
+{
+  return {smooth_exponent<T>(body.p), smooth_exponent<T>(body.p_across)};
 }
 
-/// Two bodies, r = x_i - x_j, and the exponents (those of PowerNorm in the norm that is smooth) of
+/// Two bodies, r = x_i - x_j, and the powers (those of PowerNorm in the norm that is smooth) of
 /// the equations below: continuation to the bodies' own exponents passes through others.
 template <int D, class S> struct TangencyProblem {
   const SuperellipsoidBody<D, S> &i, &j;
   Vec<D, S> r;
-  Common<ValueOf<S>> exponent_i, exponent_j;
+  Powers<Common<ValueOf<S>>> powers_i, powers_j;
 
   /// The problem with the bodies' own exponents.
   static TangencyProblem of(const SuperellipsoidBody<D, S> &i, const SuperellipsoidBody<D, S> &j,
                             const Vec<D, S> &r)
   {
     using Power = Common<ValueOf<S>>;
-    return {i, j, r, smooth_exponent<Power>(i.p), smooth_exponent<Power>(j.p)};
+    return {i, j, r, smooth_powers<Power>(i), smooth_powers<Power>(j)};
   }
 };
 
@@ -156,8 +171,8 @@ template <int D, class S> class ByNormal {
   using T = ValueOf<S>;
 
   explicit ByNormal(const TangencyProblem<D, S> &p) :
-      r(p.r), h_i(PowerNorm<D, S>::support(p.i, p.exponent_i)),
-      h_j(PowerNorm<D, S>::support(p.j, p.exponent_j))
+      r(p.r), h_i(PowerNorm<D, S>::support(p.i, p.powers_i)),
+      h_j(PowerNorm<D, S>::support(p.j, p.powers_j))
   {
   }
 
@@ -314,8 +329,8 @@ template <int D, class S> class ByPointAndNormal {
   using T = ValueOf<S>;
 
   explicit ByPointAndNormal(const TangencyProblem<D, S> &p) :
-      r(p.r), g_i(PowerNorm<D, S>::gauge(p.i, p.exponent_i)),
-      h_j(PowerNorm<D, S>::support(p.j, p.exponent_j))
+      r(p.r), g_i(PowerNorm<D, S>::gauge(p.i, p.powers_i)),
+      h_j(PowerNorm<D, S>::support(p.j, p.powers_j))
   {
   }
 
@@ -368,8 +383,8 @@ template <int D, class S> class ByPoint {
   using T = ValueOf<S>;
 
   explicit ByPoint(const TangencyProblem<D, S> &p) :
-      r(p.r), length(value_of(norm(p.r))), g_i(PowerNorm<D, S>::gauge(p.i, p.exponent_i)),
-      g_j(PowerNorm<D, S>::gauge(p.j, p.exponent_j))
+      r(p.r), length(value_of(norm(p.r))), g_i(PowerNorm<D, S>::gauge(p.i, p.powers_i)),
+      g_j(PowerNorm<D, S>::gauge(p.j, p.powers_j))
   {
   }
 

@@ -4,6 +4,7 @@
 #include "contact/errors.hpp"
 #include "contact/math/vec.hpp"
 #include "contact/superellipsoid/equations.hpp"
+#include "contact/superellipsoid/mixed.hpp"
 #include "contact/superellipsoid/shape.hpp"
 
 #include <algorithm>
@@ -54,26 +55,65 @@ template <int M, class T> T size_of(const Matrix<M, T> &a)
   return size < std::numeric_limits<T>::max() ? size : std::numeric_limits<T>::infinity();
 }
 
-/// Bound of the change of |x|^power for all changes of x up to `off`, in units of `unit`.
+/// Bound of the change of |x|^power for a change of x by up to off.
+template <class T> T power_off(const T &x, const T &off, const T &power)
+{
+  const T above = pow(x + off, power), below = pow(abs(x - off), power);
+  return x > off ? above - below : above + below;
+}
+
+/// Bound of the change of s_k |x_k|^power.axis, a gradient of a FlatNorm, for changes of each x_k
+/// by up to off_k, over the unit of x; with two exponents of that of the nested norm, rho^axis
+/// (|x_k| / rho)^across across z, and its length.
 template <int D, class T> struct PowerOff {
   Vec<D, T> x, off, unit;
-  T power;
+  Powers<T> power;
 
-  T length() const
+  T change() const
   {
     T square = 0;
     for (int k = 0; k < D; ++k) {
-      const T above = pow(x[k] + off[k], power), below = pow(abs(x[k] - off[k]), power);
-      const T most = x[k] > off[k] ? above - below : above + below;
+      const T most = is_across(k) ? change_across(k) : power_off(x[k], off[k], power.axis);
       square += most * most * unit[k] * unit[k];
     }
     return sqrt(square);
   }
+  T length() const
+  {
+    T square = 0;
+    for (int k = 0; k < D; ++k) {
+      const T one = unit[k] * (is_across(k) ? outer() * share(k) : pow(x[k], power.axis));
+      square += one * one;
+    }
+    return sqrt(square);
+  }
+
+ private:
+  bool is_across(int k) const { return D == 3 && k < 2 && power.across != power.axis; }
+  T rho() const
+  {
+    const T e = power.across + 1, largest = std::max(x[0], x[1]);
+    if (largest == 0) return 0;
+    return largest * pow(pow(x[0] / largest, e) + pow(x[1] / largest, e), 1 / e);
+  }
+  T outer() const { return pow(rho(), power.axis); }
+  T share(int k) const { return rho() > 0 ? pow(x[k] / rho(), power.across) : T(0); }
+
+  /// Bound for a product of which the second factor, at most 1, is a power of a ratio. A norm
+  /// changes by at most the sum of the changes.
+  T change_across(int k) const
+  {
+    const T off_rho = off[0] + off[1], least = rho() - off_rho;
+    const T by_outer = power_off(rho(), off_rho, power.axis);
+    if (!(least > 0)) return outer() + by_outer;
+    const T off_ratio = (off[k] + off_rho) / least;
+    return by_outer + outer() * std::min(T(1), power_off(x[k] / rho(), off_ratio, power.across));
+  }
 };
 
 /// One body at the point where another touches it, both scaled by eta: the dependence of normal and
-/// point on each other. For p <= 1 the normal is the smooth unknown and `bend` maps its changes to
-/// those of the point; for p > 1 it maps changes of the point to those of the normal.
+/// point on each other. By normal, the latter is the smooth unknown and `bend` maps its changes to
+/// those of the point; by point, it maps changes of the point to those of the normal.
 template <int D, class T> class BodyAtPoint {
  public:
   using Body = SuperellipsoidBody<D, T>;
@@ -98,8 +138,12 @@ template <int D, class T> class BodyAtPoint {
   /// Both points lie within each of the bodies.
   T width_at_most() const { return 2 * scale * body.bounding_radius; }
 
-  bool by_normal() const { return is_by_normal(body.p); }
-  T exponent() const { return smooth_exponent<T>(body.p); }
+  bool by_normal() const { return is_by_normal(body); }
+  T exponent() const
+  {
+    const auto powers = smooth_powers<T>(body);
+    return std::max(powers.axis, powers.across);
+  }
 
   Vec<D, T> normal, point;  // each computed from the other
   AcrossMatrix<D, T> bend;
@@ -108,28 +152,25 @@ template <int D, class T> class BodyAtPoint {
   /// at a face or a tip, where `bend` is zero.
   T normal_off(const T &off) const
   {
-    PowerOff<D, T> from{{}, {}, {}, 2 * T(body.p) - 1};
-    T square = 0;
+    PowerOff<D, T> from{{}, {}, {}, {2 * T(body.p) - 1, 2 * T(body.p_across) - 1}};
     for (int k = 0; k < D; ++k) {
       const T length = scale * body.semi_axes[k];
       from.x[k] = abs(dot(body.axis[k], point)) / length;
       from.off[k] = off / length;
       from.unit[k] = 1 / T(body.semi_axes[k]);
-      const T component = pow(from.x[k], from.power) * from.unit[k];
-      square += component * component;
     }
-    return from.length() / sqrt(square);
+    return from.change() / from.length();
   }
   T point_off(const T &off) const
   {
-    PowerOff<D, T> from{{}, {}, {}, 1 / (2 * T(body.p) - 1)};
+    PowerOff<D, T> from{{}, {}, {}, {1 / (2 * T(body.p) - 1), 1 / (2 * T(body.p_across) - 1)}};
     for (int k = 0; k < D; ++k) {
       const T a = body.semi_axes[k];
       from.x[k] = abs(dot(body.axis[k], normal)) * a / width;
       from.off[k] = off * a / width;
       from.unit[k] = scale * a;
     }
-    return from.length();
+    return from.change();
   }
 
  private:
@@ -247,6 +288,46 @@ template <int D, class T> class Conditioning {
   }
 };
 
+/// The same where a body has mixed coordinates, from those of both bodies: the response of points
+/// and normals to the residual and its rounding, to linear order, with the same factor.
+template <class T>
+OffByResidual<T> off_of_both(const SuperellipsoidBody<3, T> &i, const SuperellipsoidBody<3, T> &j,
+                             const Vec<3, T> &r, const Tangency<3, T> &at)
+{
+  constexpr int M = ByBoth<T>::M;
+  constexpr T ROUNDING = 16 * std::numeric_limits<T>::epsilon();
+  const auto problem = TangencyProblem<3, T>::of(i, j, r);
+  const ByBoth<T> equations(problem);
+  const Vec<M, T> z = equations.start(at);
+  const auto by = equations.linearised(z);
+  T change_sq[4]{};  // of both points over |r|, and of both normals times |r| and their weights
+  for (int from = 0; from < M; ++from) {
+    Vec<M, T> unit{};
+    unit[from] = 1;
+    const Vec<M, T> response = solved(by.jacobian, unit);
+    T residual = abs(by.residual[from]) + ROUNDING;
+    for (int b = 0; b < M; ++b) residual += ROUNDING * abs(by.jacobian.row[from][b] * z[b]);
+    for (int a = 0; a < 6; ++a) {
+      for (int body = 0; body < 2; ++body) {
+        T change = 0;
+        for (int b = 0; b < 3; ++b)
+          change += by.jacobian.row[a][3 * body + b] * response[3 * body + b];
+        change_sq[2 * (a / 3) + body] += M * change * change * residual * residual;
+      }
+    }
+  }
+  const auto powers = {problem.powers_i, problem.powers_j};
+  T steepest = 1;
+  for (const Powers<T> &of : powers) steepest = std::max({steepest, of.axis, of.across});
+  const auto largest = [&](int from, const T &over) {
+    const T size = steepest * sqrt(std::max(change_sq[from], change_sq[from + 1])) / over;
+    return size < std::numeric_limits<T>::max() ? size : std::numeric_limits<T>::infinity();
+  };
+  const T length = norm(r), weighted = length * equations.weighted_normal(z);
+  const T width = 2 * at.scale * std::min(i.bounding_radius, j.bounding_radius);
+  return {std::min(largest(2, weighted), T(2)), std::min(largest(0, 1 / length), width)};
+}
+
 }  // namespace detail
 
 /// Errors from the two bounds of the scale, and from Conditioning.
@@ -264,10 +345,16 @@ ErrorsOfGeometry<T> errors_of_geometry(const SuperellipsoidBody<D, T> &i,
       along / (Norm::support(i).value(bond.normal) + Norm::support(j).value(bond.normal));
   const T above = std::max(Norm::gauge(i).value(y), Norm::gauge(j).value(r - y));
   const T of_scale = std::max(eta - below, above - eta) + 16 * std::numeric_limits<T>::epsilon();
-  const BodyAtPoint<D, T> at_i(i, y, bond.normal, eta), at_j(j, r - y, bond.normal, eta);
-  const bool in_order = !at_i.by_normal() || at_j.by_normal();
-  const OffByResidual<T> off =
-      in_order ? Conditioning<D, T>(at_i, at_j, r).off() : Conditioning<D, T>(at_j, at_i, r).off();
+  const auto found = [&]() -> OffByResidual<T> {
+    if constexpr (D == 3) {
+      if (is_mixed(i, j)) return off_of_both(i, j, r, {eta, bond.normal, y, r - y});
+    }
+    const BodyAtPoint<D, T> at_i(i, y, bond.normal, eta), at_j(j, r - y, bond.normal, eta);
+    const bool in_order = !at_i.by_normal() || at_j.by_normal();
+    return in_order ? Conditioning<D, T>(at_i, at_j, r).off()
+                    : Conditioning<D, T>(at_j, at_i, r).off();
+  };
+  const OffByResidual<T> off = found();
   const T overlap = (1 - eta) * (1 + eta);
   return {2 * of_scale / overlap, off.normal * (1 + norm(r) / along) + 2 * of_scale, off.point};
 }

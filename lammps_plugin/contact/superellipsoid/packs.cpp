@@ -22,6 +22,7 @@ template <int D> BodyLanes<D> sizes_of(const SuperellipsoidBody<D> *bodies, cons
 {
   BodyLanes<D> lanes;
   lanes.p = bodies[index[0]].p;
+  lanes.p_across = bodies[index[0]].p_across;
   lanes.bounding_radius =
       each<D>(bodies, index, [](const auto &body) { return body.bounding_radius; });
   for (int a = 0; a < D; ++a) {
@@ -45,7 +46,7 @@ template <int D> bool are_round(const BodyLanes<D> &bodies)
 {
   Mask round = bodies.semi_axes[1] == bodies.semi_axes[0];
   for (int a = 2; a < D; ++a) round = round & (bodies.semi_axes[a] == bodies.semi_axes[0]);
-  return bodies.p == 1.0 && all(round);
+  return bodies.is_ellipsoid() && all(round);
 }
 
 template <int D> struct PairLanes {
@@ -74,7 +75,7 @@ Vec<D, Pack> begin(const PairLanes<D> &pairs, const ContactBlock<D> &block, int 
   const Vec<D, Pack> n = ellipsoids.scaled(before);
   if (!any(anew)) return n;
   Vec<D, Pack> start = ellipsoids.start();
-  if (pairs.i.p != 1.0) detail::newton_in_lanes(ellipsoids, start, ROUGH, anew);
+  if (!pairs.i.is_ellipsoid()) detail::newton_in_lanes(ellipsoids, start, ROUGH, anew);
   return chosen(begun, n, start);
 }
 
@@ -118,8 +119,8 @@ FoundLanes<D> found_by(const PairLanes<D> &pairs, const Vec<D, Pack> &n)
 
 template <int D> FoundLanes<D> found_from(const PairLanes<D> &pairs, const Vec<D, Pack> &n)
 {
-  if (pairs.i.p == 1.0) return found_by_ellipsoids(pairs, n);
-  if (detail::is_by_normal(pairs.i.p)) return found_by<detail::ByNormal<D, Pack>>(pairs, n);
+  if (pairs.i.is_ellipsoid()) return found_by_ellipsoids(pairs, n);
+  if (detail::is_by_normal(pairs.i)) return found_by<detail::ByNormal<D, Pack>>(pairs, n);
   return found_by<detail::ByPoint<D, Pack>>(pairs, n);
 }
 

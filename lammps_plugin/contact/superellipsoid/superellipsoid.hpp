@@ -186,7 +186,8 @@ struct SuperellipsoidModel {
 
   static constexpr const char *NAME = "superellipsoid";
   static constexpr const char *SHAPE_RULE =
-      "a superellipsoid has positive diameters (2a, 2b, 2c) and an exponent p above 0.5";
+      "a superellipsoid has positive diameters (2a, 2b, 2c) and an exponent p above 0.5, or two "
+      "exponents n1 n2 above 1";
   static constexpr const char *CORE = "centres";
   static constexpr int MOST_BONDS = 1;
   static constexpr bool HAS_SIDES = false;
@@ -199,17 +200,19 @@ struct SuperellipsoidModel {
   using Form = SuperellipsoidForm;
   static constexpr const char *FORM = "p";
   static constexpr const char *FORM_RULE =
-      "a finite number above 0.5: particles of other exponents are not convex";
+      "a finite number above 0.5, or two numbers n1 n2 above 1, those of LAMMPS, where n1 = n2 = "
+      "2p "
+      "is the same body: particles of other exponents are not convex";
 
   static std::optional<Shape> shape_from(const Vec<3> &semi_axes, const Form &form)
   {
-    return superellipsoid_from(semi_axes, form.p);
+    return superellipsoid_from(semi_axes, form);
   }
 
   template <int D> static Shortcut shortcut(const Shape &shape)
   {
     if (shape.is_round<D>()) return Shortcut::ROUND;
-    return shape.p == 1.0 ? Shortcut::ELLIPSOIDS : Shortcut::NONE;
+    return shape.is_ellipsoid() ? Shortcut::ELLIPSOIDS : Shortcut::NONE;
   }
 
   template <int D> static bool turns(const Shape &shape) { return !shape.is_round<D>(); }
@@ -249,6 +252,7 @@ struct SuperellipsoidModel {
       body.semi_axes[k] = shape.semi_axes[k];
     }
     body.p = shape.p;
+    body.p_across = shape.p_across;
     body.bounding_radius = shape.bounding_radius<D>();
     return body;
   }
@@ -316,7 +320,7 @@ struct SuperellipsoidModel {
   }
 };
 
-/// Compiled in packs.cpp for each instruction set.
+/// Compiled in packs.cpp for each instruction set. Bodies with two exponents do without.
 template <InstructionSet SET, int D>
 FindContacts<SuperellipsoidModel, D> find_superellipsoid_contacts;
 
@@ -324,7 +328,7 @@ template <int D> struct PacksOf<SuperellipsoidModel, D> {
   static constexpr bool EXIST = true, CHOOSE = false;
   static bool take(const Superellipsoid &shape, const Superellipsoid &first)
   {
-    return shape.p == first.p;
+    return shape.p == first.p && shape.p_across == shape.p;
   }
 
   static FindContacts<SuperellipsoidModel, D> *of(InstructionSet set)

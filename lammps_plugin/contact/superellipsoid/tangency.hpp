@@ -3,6 +3,7 @@
 #include "contact/math/vec.hpp"
 #include "contact/superellipsoid/barrier.hpp"
 #include "contact/superellipsoid/equations.hpp"
+#include "contact/superellipsoid/mixed.hpp"
 #include "contact/superellipsoid/shape.hpp"
 
 #include <algorithm>
@@ -67,12 +68,18 @@ template <int D, class T>
 T gap_of(const detail::TangencyProblem<D, T> &pair, const Tangency<D, T> &at)
 {
   using Norm = PowerNorm<D, T>;
+  using detail::Coordinates;
+  const Coordinates by_i = detail::coordinates_of(pair.i), by_j = detail::coordinates_of(pair.j);
   const auto larger = [](const T &a, const T &b) { return most(a, b) + T(0.0) * b; };  // or NaN
   T gap = most(T(Norm::gauge(pair.j).value(pair.r - at.point_i) - at.scale), T(0.0));
-  if (!detail::is_by_normal(pair.i.p)) {
+  if (by_i != Coordinates::NORMAL) {
     gap = larger(gap, Norm::gauge(pair.i).value(at.point_i) - at.scale);
   }
-  if (!detail::is_by_normal(pair.j.p)) {
+  if (by_i == Coordinates::MIXED || by_j == Coordinates::MIXED) {
+    const T widths =
+        Norm::support(pair.i).value(at.normal) + Norm::support(pair.j).value(at.normal);
+    gap = larger(gap, at.scale - dot(pair.r, at.normal) / widths);
+  } else if (by_j == Coordinates::POINT) {
     const T below = dot(pair.r, at.normal) / (T(1.0) + Norm::support(pair.j).value(at.normal));
     gap = larger(gap, at.scale - below);
   }
@@ -91,7 +98,7 @@ template <int D, class T> class TangencySearch {
   /// Bodies are symmetric about their centres, so that exchanging them leaves r unchanged.
   TangencySearch(const Body &body_i, const Body &body_j, const TangencyWish<D, T> &wish) :
       r(wish.r), may_stop_apart(wish.may_stop_apart), shortcuts(wish.shortcuts),
-      is_swapped(detail::is_by_normal(body_i.p) && !detail::is_by_normal(body_j.p)),
+      is_swapped(detail::is_by_normal(body_i) && !detail::is_by_normal(body_j)),
       i(is_swapped ? body_j : body_i), j(is_swapped ? body_i : body_j)
   {
   }
@@ -169,7 +176,7 @@ template <int D, class T> class TangencySearch {
  private:
   Vec<D, T> r;
   bool may_stop_apart, shortcuts, is_swapped;
-  const Body &i, &j;  // a body with p > 1 comes first
+  const Body &i, &j;  // a body by its normal comes last
 
   static constexpr T TOLERANCE = T(short_step<T>());
   static constexpr T ROUGH = T(1e-2);
@@ -177,7 +184,7 @@ template <int D, class T> class TangencySearch {
   static constexpr double BARRIERS[] = {1e-4,  1e-6,  1e-8,  1e-9,  1e-10, 1e-11, 1e-12, 1e-13,
                                         1e-15, 1e-17, 1e-20, 1e-23, 1e-26, 1e-29};  // their last mu
 
-  bool are_ellipsoids() const { return shortcuts && i.p == 1.0 && j.p == 1.0; }
+  bool are_ellipsoids() const { return shortcuts && i.is_ellipsoid() && j.is_ellipsoid(); }
 
   FoundTangency<D, T> of_ellipsoids(const detail::ByNormalOfEllipsoids<D, T> &ellipsoids,
                                     Vec<D, T> n) const
@@ -235,7 +242,16 @@ template <int D, class T> class TangencySearch {
       if (found.gap < best.gap) best = found;
       found.is_fallback = true;
     }
-    detail::ConeBarrier<D, T> barrier(i, j, r);
+    if (D == 3 && (i.has_two_exponents() || j.has_two_exponents())) {
+      follow_centre(detail::ConeBarrier<D, T, D == 3>(i, j, r), found, best);
+    } else {
+      follow_centre(detail::ConeBarrier<D, T, false>(i, j, r), found, best);
+    }
+  }
+
+  template <class Barrier>
+  void follow_centre(Barrier barrier, FoundTangency<D, T> &found, FoundTangency<D, T> &best) const
+  {
     for (const double mu : BARRIERS) {
       if (T(mu) < 50 * std::numeric_limits<T>::epsilon()) break;
       barrier.follow(T(mu), found.iterations);
@@ -269,16 +285,20 @@ template <int D, class T> class TangencySearch {
   /// Continues to the bodies' own exponents in stages of this ratio, or directly for ratio 1.
   bool to_own_exponents(FoundTangency<D, T> &found, double ratio) const
   {
-    if (detail::is_by_normal(i.p)) return in_stages<detail::ByNormal<D, T>>(found, ratio);
-    if (detail::is_by_normal(j.p)) return in_stages<detail::ByPointAndNormal<D, T>>(found, ratio);
+    if constexpr (D == 3) {
+      if (detail::is_mixed(i, j)) return in_stages<detail::ByBoth<T>>(found, ratio);
+    }
+    if (detail::is_by_normal(i)) return in_stages<detail::ByNormal<D, T>>(found, ratio);
+    if (detail::is_by_normal(j)) return in_stages<detail::ByPointAndNormal<D, T>>(found, ratio);
     return in_stages<detail::ByPoint<D, T>>(found, ratio);
   }
 
   template <class Equations> bool in_stages(FoundTangency<D, T> &found, double ratio) const
   {
-    const T e_i = detail::smooth_exponent<T>(i.p), e_j = detail::smooth_exponent<T>(j.p);
+    const auto e_i = detail::smooth_powers<T>(i), e_j = detail::smooth_powers<T>(j);
     int last = 1;
-    const T most = ratio > 1.0 ? std::max(e_i, e_j) * T(1 - 1e-9) : T(1);
+    const T largest = std::max({e_i.axis, e_i.across, e_j.axis, e_j.across});
+    const T most = ratio > 1.0 ? largest * T(1 - 1e-9) : T(1);
     for (T reached = T(ratio); reached < most; reached *= T(ratio)) ++last;
     Vec<Equations::M, T> z{};
     bool is_converged = false;
@@ -298,6 +318,11 @@ template <int D, class T> class TangencySearch {
         found.is_settled = is_converged && Equations::is_well_posed(matrix);
     }
     return is_converged;
+  }
+
+  static Powers<T> between(const Powers<T> &powers, T share)
+  {
+    return {between(powers.axis, share), between(powers.across, share)};
   }
 
   /// Integer powers need no logarithm.
@@ -324,6 +349,7 @@ SuperellipsoidBody<D, T> plain(const SuperellipsoidBody<D, S> &body)
   for (int k = 0; k < D; ++k) of.axis[k] = plain<T>(body.axis[k]);
   of.semi_axes = body.semi_axes;
   of.p = body.p;
+  of.p_across = body.p_across;
   of.bounding_radius = body.bounding_radius;
   return of;
 }
@@ -376,15 +402,18 @@ template <int D, class S> class TangencyIn {
 
   Tangency<D, S> from(const Tangency<D, T> &found) const
   {
-    if (detail::is_by_normal(i.p) && !detail::is_by_normal(j.p)) {
+    if (detail::is_by_normal(i) && !detail::is_by_normal(j)) {
       const Tangency<D, T> other{found.scale, found.normal, found.point_j, found.point_i};
       Tangency<D, S> at = TangencyIn(j, i, r).from(other);
       std::swap(at.point_i, at.point_j);
       return at;
     }
     using namespace detail;
-    if (is_by_normal(i.p)) return step<ByNormal<D, S>, ByNormal<D, T>>(found);
-    if (is_by_normal(j.p)) return step<ByPointAndNormal<D, S>, ByPointAndNormal<D, T>>(found);
+    if constexpr (D == 3) {
+      if (is_mixed(i, j)) return step<ByBoth<S>, ByBoth<T>>(found);
+    }
+    if (is_by_normal(i)) return step<ByNormal<D, S>, ByNormal<D, T>>(found);
+    if (is_by_normal(j)) return step<ByPointAndNormal<D, S>, ByPointAndNormal<D, T>>(found);
     return step<ByPoint<D, S>, ByPoint<D, T>>(found);
   }
 
@@ -394,7 +423,7 @@ template <int D, class S> class TangencyIn {
 
   template <class InS, class Plain> Tangency<D, S> step(const Tangency<D, T> &found) const
   {
-    const T e_i = detail::smooth_exponent<T>(i.p), e_j = detail::smooth_exponent<T>(j.p);
+    const auto e_i = detail::smooth_powers<T>(i), e_j = detail::smooth_powers<T>(j);
     const PlainBody plain_i = plain<T>(i), plain_j = plain<T>(j);
     const Plain equations({plain_i, plain_j, plain<T>(r), e_i, e_j});
     const InS in_s({i, j, r, e_i, e_j});

@@ -227,7 +227,7 @@ def _of_modes(attributes: Mapping[str, Any]) -> dict[str, Any]:
 def _shape_with(known: Mapping[str, Any]) -> str | None:
     """Name the first shape whose parameters are all present."""
     for name, shape in SHAPES.items():
-        if all(parameter.name in known for parameter in shape.parameters):
+        if all(parameter.name in known for parameter in shape.needed):
             return name
     return None
 

@@ -90,7 +90,7 @@ class _Parameters(Action):
         del parser, option_string
         shape = SHAPES[self.dest]
         try:
-            read = {p.name: p.told(v) for p, v in zip(shape.parameters, values, strict=True)}
+            read = {p.name: p.told(v) for p, v in zip(shape.needed, values, strict=True)}
         except ValueError as error:
             raise ArgumentError(self, str(error)) from error
         setattr(namespace, self.dest, [*getattr(namespace, self.dest), read])
@@ -111,11 +111,11 @@ def options_of() -> ArgumentParser:
     for shape in SHAPES.values():
         parser.add_argument(
             f"--{shape.name}",
-            nargs=len(shape.parameters),
+            nargs=len(shape.needed),
             action=_Parameters,
             default=[],
-            metavar=tuple(p.option.upper() for p in shape.parameters),
-            help=f"{', '.join(p.meaning for p in shape.parameters)}; may be given several times",
+            metavar=tuple(p.option.upper() for p in shape.needed),
+            help=f"{', '.join(p.meaning for p in shape.needed)}; may be given several times",
         )
     parser.add_argument(
         "--samples", type=int, default=6, help="samples of each, with one seed each (6)"
@@ -163,7 +163,7 @@ def particles(options: Namespace) -> list[Particle]:
 def particle_of(shape: Shape, parameters: Mapping[str, Any]) -> Particle:
     """Name particles of a shape."""
     told, asked = ["--shape", shape.name], [f"--{shape.name}"]
-    for parameter in shape.parameters:
+    for parameter in shape.needed:
         value = parameters[parameter.name]
         text = value if isinstance(value, str) else repr(value)
         told += [f"--{parameter.option}", text]

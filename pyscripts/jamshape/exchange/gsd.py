@@ -217,7 +217,7 @@ def _described(solid: Solid) -> dict[str, Any]:
 @_described.register
 def _(solid: Superquadric) -> dict[str, Any]:
     axes = dict(zip("abc", solid.semi_axes.tolist(), strict=True))
-    return {"type": "Ellipsoid", **axes} if solid.roundness == 1 else {}
+    return {"type": "Ellipsoid", **axes} if set(solid.roundness) == {1.0} else {}
 
 
 @_described.register

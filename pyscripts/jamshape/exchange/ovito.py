@@ -44,7 +44,7 @@ class _Glyph(NamedTuple):
     name: str
     """Name in `ParticlesVis.Shape`."""
     aspherical_shape: tuple[float, ...] = ()
-    roundness: float | None = None
+    roundness: tuple[float, float] | None = None
     first_turned: tuple[float, float, float, float] = _STILL
 
 
@@ -229,7 +229,7 @@ def _add_bodies(particles: Any, packing: Packing) -> None:
     particles.create_property("Aspherical Shape", data=shapes[of])
     if glyphs[0].roundness is not None:
         roundness = np.array([glyph.roundness for glyph in glyphs])[of]
-        particles.create_property("Superquadric Roundness", data=np.tile(roundness, (2, 1)).T)
+        particles.create_property("Superquadric Roundness", data=roundness)
 
 
 class _Known(NamedTuple):
@@ -246,7 +246,8 @@ def _known_sizes(packing: Packing) -> _Known:
     rows = zip(packing.diameters[bodies.first], packing.form[bodies.first], strict=True)
     found = [packing.shape.parameters_of(d, form) for d, form in rows]
     names = [parameter.name for parameter in packing.shape.parameters]
-    parameters = np.array([[of[name] for name in names] for of, _ in found])
+    # Those that others replace are 0.
+    parameters = np.array([[of.get(name, 0.0) for name in names] for of, _ in found])
     sizes = np.array([size for _, size in found])
     return _Known(np.round(parameters, _DIGITS)[bodies.of], sizes[bodies.of])
 

@@ -126,8 +126,8 @@ def number(attributes: Mapping[str, Any], name: str, who: str, expected: str) ->
 def system_of(attributes: Mapping[str, Any], shape: str, dimension: int) -> System:
     """Return the system of a packing, from its attributes, shape style and dimension."""
     its = {parameter.name: parameter for parameter in shape_named(shape).parameters}
-    told = its.keys() <= attributes.keys()
-    known = tuple((name, one.read(attributes[name])) for name, one in its.items() if told)
+    own = shape_named(shape).told(attributes)
+    known = tuple((name, its[name].read(value)) for name, value in own.items())
     kinds = str(attributes.get("kinds", ""))
     protocol = str(attributes.get("protocol", ""))
     sweeps = int(attributes.get("n_sweeps", 0))

@@ -11,8 +11,9 @@ not read, states them with the dimension, and a comment behind each row of Ellip
 `jamshape.files.meaning` decides.
 
 Dumps hold the exponent p twice: in a column ``exponent``, in full precision, and as 1/p in
-``SuperquadricRoundness.Phi`` and ``.Theta``, with which OVITO draws the bodies. Data files of LAMMPS from 2026 on may
-hold 2p twice, behind each row of Ellipsoids.
+``SuperquadricRoundness.Phi`` and ``.Theta``, with which OVITO draws the bodies. Two exponents n1 and n2 are in columns
+``block1`` and ``block2``, and as 2/n1 and 2/n2 in these. Data files of LAMMPS from 2026 on may hold n1 and n2 behind
+each row of Ellipsoids.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ from jamshape.shapes.shape import Stiffness, power_of, stiffness_of, stiffness_t
 from jamshape.shapes.table import SHAPES
 
 _TITLE = "LAMMPS data file by jamshape"
-_EXPONENT_COMMENT, _FORM_COMMENT = "exponent=", "form="
+_EXPONENT_COMMENT, _BLOCK_COMMENT, _FORM_COMMENT = "exponent=", "block=", "form="
 _FORM = "# form "  # and its number, a colon and numbers, in one line or several
 _NUMBERS_IN_LINE = 8
 _POSITION = ("x", "y", "z")
@@ -75,7 +76,7 @@ _DUMP_COLUMNS = ("id", "type", *_POSITION, *_QUATERNION, *_DIAMETERS)
 _ATOMS = ("id", "type", "ellipsoidflag", "density", *_POSITION)
 _SPHERES = ("id", "type", "diameter", "density", *_POSITION)
 _ELLIPSOIDS = ("id", *_DIAMETERS, *_QUATERNION)
-_BLOCKS = ("block1", "block2")  # 2p each, of atom_style ellipsoid superellipsoid
+_BLOCKS = ("block1", "block2")  # n1 and n2 of atom_style ellipsoid superellipsoid
 _ATOM_STYLE = "ellipsoid"
 # Columns behind those of ellipsoids, by other styles in an atom style hybrid.
 _HYBRID = {
@@ -108,7 +109,9 @@ class _Frame(NamedTuple):
     boundary: str = "pp pp pp"
 
 
-def write_data(path: PathLike, packing: Packing, density: float = 1.0) -> None:
+def write_data(
+    path: PathLike, packing: Packing, density: float = 1.0, *, blocks: bool = False
+) -> None:
     """Write a data file for ``atom_style ellipsoid``; `path` is replaced only when writing is complete.
 
     Parameters
@@ -119,6 +122,9 @@ def write_data(path: PathLike, packing: Packing, density: float = 1.0) -> None:
         from -0.5 to 0.5 in z. Shape, law and exponents go along as comments.
     density : float, [mass / length^3]
         Mass density, from which LAMMPS computes masses.
+    blocks : bool
+        Write n1 and n2 of superellipsoids behind each row of Ellipsoids, for ``atom_style ellipsoid superellipsoid`` of
+        LAMMPS from 2026 on; other versions do not read such rows.
 
     Raises
     ------
@@ -142,7 +148,11 @@ def write_data(path: PathLike, packing: Packing, density: float = 1.0) -> None:
         np.savetxt(file, atoms, fmt=["%d"] * 3 + ["%.17g"] * 4 + ["%d"] * 3)
         file.write("\nEllipsoids\n\n")
         row = ["%d"] + ["%.17g"] * 7
-        if packing.shape.has_exponent:
+        if packing.shape.has_exponent and (blocks or packing.form.shape[1] == len(_BLOCKS)):
+            row += ["%.17g" if blocks else f"# {_BLOCK_COMMENT}%.17g", "%.17g"]
+            both = packing.shape.widened(packing.form, len(_BLOCKS))
+            ellipsoids = np.column_stack([ellipsoids, both])
+        elif packing.shape.has_exponent:
             row += [f"# {_EXPONENT_COMMENT}%.17g"]
             ellipsoids = np.column_stack([ellipsoids, packing.exponent])
         if packing.shape.has_form:
@@ -197,7 +207,10 @@ def _write_frame(file: TextIO, packing: Packing) -> None:
     columns |= dict(zip(_POSITION, _padded(packing.position).T, strict=True))
     columns |= dict(zip(_IMAGE, _padded(packing.image).astype(np.int64).T, strict=True))
     columns |= dict(zip(_PROPERTIES, [*packing.quaternions.T, *packing.diameters.T], strict=True))
-    if packing.shape.has_exponent:
+    if packing.shape.has_exponent and packing.form.shape[1] == len(_BLOCKS):
+        columns |= dict(zip(_BLOCKS, packing.form.T, strict=True))
+        columns |= dict(zip(_ROUNDNESS, 2 / packing.form.T, strict=True))
+    elif packing.shape.has_exponent:
         columns |= {"exponent": packing.exponent, **dict.fromkeys(_ROUNDNESS, 1 / packing.exponent)}
     if packing.shape.has_form:
         columns |= flat({"form": packing.form})
@@ -214,7 +227,7 @@ def _write_frame(file: TextIO, packing: Packing) -> None:
 
 
 def _place_in_row(name: str) -> int:
-    known = ("id", "type", *_POSITION, *_IMAGE, *_PROPERTIES, *_EXPONENT, *_ROUNDNESS)
+    known = ("id", "type", *_POSITION, *_IMAGE, *_PROPERTIES, *_EXPONENT, *_BLOCKS, *_ROUNDNESS)
     return known.index(name) if name in known else len(known)
 
 
@@ -492,16 +505,22 @@ def _require_closed(path: PathLike, packing: Packing, frame: _Frame) -> None:
 
 
 def _exponent(columns: Mapping[str, FloatArray]) -> FloatArray:
-    """(N,) exponents; empty if the file has none."""
+    """(N,) exponents p, or (N, 2) n1 and n2 if these differ; empty if the file has none."""
     if set(_EXPONENT) <= set(columns):
         return columns["exponent"]
-    if not set(_ROUNDNESS) <= set(columns):
-        return np.empty(0)
-    phi, theta = (columns[name] for name in _ROUNDNESS)
-    if not ((phi > 0) & (phi == theta)).all():
-        msg = f"{' and '.join(_ROUNDNESS)} differ or are not positive, expected both to be 1/p"
-        raise ValueError(msg)
-    return np.asarray(1 / phi)
+    for names, power in ((_BLOCKS, 1), (_ROUNDNESS, -1)):
+        if not set(names) <= set(columns):
+            continue
+        both = np.column_stack([columns[name] for name in names])
+        if not (both > 0).all():
+            what = "n1 and n2" if power > 0 else "2/n1 and 2/n2"
+            msg = f"{' or '.join(names)} is not positive, expected {what} of each particle"
+            raise ValueError(msg)
+        one, two = both.T
+        if (np.abs(one - two) <= _ALIKE * one).all():
+            return np.asarray(one / 2 if power > 0 else 1 / one)
+        return both if power > 0 else 2 / both
+    return np.empty(0)
 
 
 def _whole(column: FloatArray) -> IntArray:
@@ -642,19 +661,12 @@ def _ellipsoids(rows: Sequence[str], comments: Sequence[str]) -> dict[str, Float
     """Read the section Ellipsoids, with exponents if present."""
     if len(rows[0].split()) == len(_ELLIPSOIDS) + len(_BLOCKS):
         wide = (*_ELLIPSOIDS, *_BLOCKS)
-        found = _columns(rows, wide, wide)
-        one, two = (found.pop(name) for name in _BLOCKS)
-        if not ((one > 0) & (np.abs(one - two) <= _ALIKE * one)).all():
-            msg = (
-                "Ellipsoids have two block exponents that differ or are not positive, expected both to be 2p"
-                " of |x/a|^2p + |y/b|^2p + |z/c|^2p = 1"
-            )
-            raise ValueError(msg)
-        return found | {"exponent": one / 2}
-    for beginning, name in ((_EXPONENT_COMMENT, "exponent"), (_FORM_COMMENT, "form")):
+        return _columns(rows, wide, wide)
+    ours = {_EXPONENT_COMMENT: _EXPONENT, _BLOCK_COMMENT: _BLOCKS, _FORM_COMMENT: ("form",)}
+    for beginning, more in ours.items():
         if all(comment.startswith(beginning) for comment in comments):
             told = [comment.removeprefix(beginning) for comment in comments]
-            names = (*_ELLIPSOIDS, name)
+            names = (*_ELLIPSOIDS, *more)
             return _columns([f"{a} {b}" for a, b in zip(rows, told, strict=True)], names, names)
     return _columns(rows, _ELLIPSOIDS, _ELLIPSOIDS)
 
@@ -706,9 +718,15 @@ def _of_pairs(
     """Read the coefficients of our pair styles, as LAMMPS's `write_data` writes them."""
     k_e = _stiffness(rows, n_types)
     own = {int(row[0]): row for row in rows if len(set(row[:n_types])) == 1}
-    if SHAPES[shape].has_exponent and "exponent" not in columns:
-        p = {kind: float(row[n_types + 1]) for kind, row in own.items() if len(row) > n_types + 1}
-        columns["exponent"] = np.array([p.get(int(kind), 1.0) for kind in columns["type"]])
+    if SHAPES[shape].has_exponent and not {*_EXPONENT, *_BLOCKS} & set(columns):
+        usual = np.ones((1, 1))
+        told = {kind: np.array([row[n_types + 1 :]], np.float64) for kind, row in own.items()}
+        known = {kind: form if form.size else usual for kind, form in told.items()}
+        width = max((form.shape[1] for form in known.values()), default=1)
+        wide = [
+            SHAPES[shape].widened(known.get(int(kind), usual), width)[0] for kind in columns["type"]
+        ]
+        columns |= dict(zip(_EXPONENT if width == 1 else _BLOCKS, np.array(wide).T, strict=True))
     if SHAPES[shape].has_form:
         forms = {kind: [float(x) for x in row[n_types + 1 :]] for kind, row in own.items()}
         columns |= _form_rows(forms, columns["type"])
@@ -850,7 +868,7 @@ def _plain_names(columns: Sequence[str]) -> list[str]:
         if is_ours and number.isdecimal() and 0 < int(number) <= len(of):
             name = of[int(number) - 1]
         is_known = (
-            not number and name in (*_PROPERTIES, *_EXPONENT, *_WIDTHS)
+            not number and name in (*_PROPERTIES, *_EXPONENT, *_BLOCKS, *_WIDTHS)
         ) or name in _PROPERTIES
         found.append(name if is_ours and is_known else column)
     return found
@@ -879,7 +897,13 @@ def _dump_columns(
             " c_q[1] to c_q[4] and c_shape[1] to c_shape[3]"
         )
         raise ValueError(msg)
-    optional = (*_IMAGE, *_EXPONENT, *_ROUNDNESS, *(() if "shapex" in needed else _WIDTHS))
+    optional = (
+        *_IMAGE,
+        *_EXPONENT,
+        *_BLOCKS,
+        *_ROUNDNESS,
+        *(() if "shapex" in needed else _WIDTHS),
+    )
     known = _columns(rows, names, [*needed, *(name for name in optional if name in names)])
     if "shapex" not in known:
         known |= _round(known)

@@ -178,7 +178,7 @@ def write_particles(group: h5py.Group, frames: Sequence[Packing]) -> None:
     first = frames[0]
     set_attributes(group, {"shape_style": first.shape_style, **first.law.stated()})
     # Half lengths and radii reproduce overlaps without the rounding of 2(A + R).
-    more = first.shape.stored
+    more = first.shape.stored_of(first.form)
     for name in ("species", "id", "diameters", *more):
         put(group, name, getattr(first, name))
     form = functools.reduce(Form.joined, map(Form.of, frames))

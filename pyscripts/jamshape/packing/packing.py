@@ -295,6 +295,11 @@ class Packing(Record):
 
 def _exponent(packing: Packing) -> FloatArray:
     """(N,) exponents p of superellipsoids; ones for other shapes."""
+    if packing.shape.has_exponent and packing.form.shape[1] > 1:
+        if packing.dimension == 2:
+            return packing.form[:, 1] / 2
+        msg = "a packing of bodies with two exponents has no p, expected one exponent each; use form, n1 and n2"
+        raise ValueError(msg)
     return packing.form[:, 0] if packing.shape.has_exponent else np.ones(packing.n)
 
 

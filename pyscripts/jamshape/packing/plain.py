@@ -53,13 +53,20 @@ class Bodies(NamedTuple):
             for name, value in parameters.items()
         }
         if diameters is not None:
-            surplus = ["size"] * (size is not None) + [name for name in given if name != _EXPONENT]
+            beside = {_EXPONENT, *(p.name for p in set(shape.parameters) - set(shape.needed))}
+            surplus = ["size"] * (size is not None) + [name for name in given if name not in beside]
             if surplus:
                 msg = f"{surplus[0]} is given beside diameters, which determine it; leave one of them out"
                 raise ValueError(msg)
-            return cls(diameters, shape.form_of_exponents(given.get(_EXPONENT, np.ones(n))))
-        for parameter in shape.parameters:
-            if parameter.name not in given:
+            reduced = shape.reduced(given)
+            if set(reduced) <= {_EXPONENT}:
+                return cls(diameters, shape.form_of_exponents(reduced.get(_EXPONENT, np.ones(n))))
+            usual = {p.name: p.default for p in shape.needed}
+            return cls(diameters, shape.sizes(usual | reduced, np.ones(n))[1])
+        given = shape.reduced(given)
+        needed = shape.reduced({p.name: p.default for p in shape.needed} | given)
+        for parameter in shape.needed:
+            if parameter.name in needed and parameter.name not in given:
                 msg = f"{parameter.option} of {shape.name}s is missing, expected {parameter.meaning}, or diameters"
                 raise ValueError(msg)
         lengths = _each("size", 1.0 if size is None else size, n)

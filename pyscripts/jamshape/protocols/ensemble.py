@@ -68,9 +68,8 @@ def _kept(recipe: Recipe, out: Path) -> Mapping[str, Any]:
 def file_of(folder: Path, recipe: Recipe) -> Path:
     """Name the file of a sample, as `jamshape sweep` does."""
     particles, told = recipe.particles, recipe.particles.told
-    names = [parameter.name for parameter in particles.shape.parameters]
-    is_one = set(names) <= told.keys()
-    stem = particles.shape.stem({name: told[name] for name in names}) if is_one else "mixture"
+    own = particles.shape.told(told)
+    stem = particles.shape.stem(own) if own else "mixture"
     return folder / f"{stem}_seed{recipe.seed}.h5"
 
 

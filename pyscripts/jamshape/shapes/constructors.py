@@ -83,7 +83,12 @@ def signature_of(shape: Shape) -> Signature:
     """Signature of the constructor of a shape, with types as text."""
     either = inspect.Parameter.POSITIONAL_OR_KEYWORD
     arguments = [
-        inspect.Parameter(p.option, either, default=p.default, annotation="ArrayLike")
+        inspect.Parameter(
+            p.option,
+            either,
+            default=p.default,
+            annotation="ArrayLike" if p.default is not None else "ArrayLike | None",
+        )
         for p in shape.parameters
     ]
     ratio = inspect.Parameter("size_ratio", either, default=None, annotation="float | None")
@@ -104,7 +109,9 @@ def _text_of(shape: Shape) -> str:
         size_ratio=shape.size_ratio,
         unit=shape.unit,
         name=shape.compiled_name,
-        example=", ".join(f"{p.option}={_shown(first[p.name])}" for p in shape.parameters),
+        example=", ".join(
+            f"{p.option}={_shown(first[p.name])}" for p in shape.parameters if p.name in first
+        ),
         made=Particles.of(shape, 1.25, **first),
     )
 
@@ -128,7 +135,7 @@ def _shown(value: float | str) -> str:
 
 def _particles(
     shape: Shape,
-    parameters: Mapping[str, ArrayLike],
+    parameters: Mapping[str, ArrayLike | None],
     size_ratio: float | None,
     kinds: Mapping[str, ArrayLike],
 ) -> Particles:
@@ -142,6 +149,7 @@ def _particles(
     values: dict[str, Any] = {
         k: _texts(texts[k], v) if k in texts else real_numbers(k, v)
         for k, v in {**parameters, **kinds}.items()
+        if v is not None
     }
     if not kinds and all(np.ndim(value) == 0 for value in values.values()):
         return Particles.of(shape, size_ratio, **{k: v.item() for k, v in values.items()})

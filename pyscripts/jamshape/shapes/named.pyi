@@ -14,6 +14,8 @@ def Superellipsoids(
     p: ArrayLike = 1.0,
     w1: ArrayLike = 1.0,
     w2: ArrayLike = 1.0,
+    n1: ArrayLike | None = None,
+    n2: ArrayLike | None = None,
     size_ratio: float | None = None,
     law: str | float = ...,
     **kinds: ArrayLike,

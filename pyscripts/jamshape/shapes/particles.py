@@ -276,7 +276,8 @@ def _with_defaults(shape: Shape, parameters: Mapping[str, Any]) -> dict[str, Any
             msg = f"{name} is not a parameter of {shape.name}s, expected {', '.join(known)}"
             raise ValueError(msg)
     chosen = known | given
-    return {p.name: p.read(chosen[p.name]) for p in shape.parameters}
+    present = (p for p in shape.parameters if chosen[p.name] is not None)
+    return shape.reduced({p.name: p.read(chosen[p.name]) for p in present})
 
 
 @dataclass(frozen=True)

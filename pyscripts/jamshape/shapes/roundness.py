@@ -135,10 +135,11 @@ def axes_from(w1: ArrayLike, w2: ArrayLike) -> FloatArray:
     return np.stack([np.ones_like(short), 1 / short, long / short], axis=-1)
 
 
-def volume(semi_axes: ArrayLike, p: ArrayLike) -> FloatArray:
+def volume(semi_axes: ArrayLike, p: ArrayLike, p_across: ArrayLike | None = None) -> FloatArray:
     """Volume, 8 a b c Gamma(1 + 1/2p)^3 / Gamma(1 + 3/2p).
 
-    See `checked` for parameters and errors.
+    See `checked` for parameters and errors; `p_across` is half the exponent n2 of sections across z, p by default.
+    These then have another area, Gamma(1 + 1/n2)^2 / Gamma(1 + 2/n2) in place of that of p.
 
     Returns
     -------
@@ -148,10 +149,20 @@ def volume(semi_axes: ArrayLike, p: ArrayLike) -> FloatArray:
     of_unit = (
         8 * scipy.special.gamma(1 + 0.5 / exponent) ** 3 / scipy.special.gamma(1 + 1.5 / exponent)
     )
+    if p_across is not None:
+        _, across = checked(semi_axes, p_across)
+        of_unit = of_unit * _section(across) / _section(exponent)
     return np.asarray(of_unit * axes.prod(axis=-1))
 
 
-def surface_area(semi_axes: ArrayLike, p: ArrayLike) -> SurfaceArea:
+def _section(p: FloatArray) -> FloatArray:
+    """Return a quarter of the area of a section with semi-axes 1."""
+    return np.asarray(scipy.special.gamma(1 + 0.5 / p) ** 2 / scipy.special.gamma(1 + 1 / p))
+
+
+def surface_area(
+    semi_axes: ArrayLike, p: ArrayLike, p_across: ArrayLike | None = None
+) -> SurfaceArea:
     r"""Area of the surface.
 
     With u, v, w = |x/a|^2p, |y/b|^2p, |z/c|^2p on the surface, u + v + w = 1, equal volumes of the
@@ -165,7 +176,9 @@ def surface_area(semi_axes: ArrayLike, p: ArrayLike) -> SurfaceArea:
     decays exponentially, for all p; and double exponentially in :math:`\sinh^{-1}`, which is sampled at equal
     steps. For p = 1, :math:`A = 4 \pi R_G(a^2 b^2, b^2 c^2, c^2 a^2)` (Carlson).
 
-    See `checked` for parameters and errors.
+    With two exponents, w and u + v are the variables of p, and u/v is that of sections across z.
+
+    See `checked` for parameters and errors; `p_across` is half the exponent of sections across z, p by default.
 
     Returns
     -------
@@ -173,14 +186,21 @@ def surface_area(semi_axes: ArrayLike, p: ArrayLike) -> SurfaceArea:
         The relative error is below 1e-13 for p from 0.5 to 20 and axis ratios up to 100.
     """
     axes, exponent = checked(semi_axes, p)
-    shapes = np.concatenate([np.sort(axes, axis=-1), exponent[..., None]], axis=-1)
-    different, which = np.unique(shapes.reshape(-1, 4), axis=0, return_inverse=True)
-    found = np.array([_area_of(row[:3], float(row[3])) for row in different]).reshape(-1, 2)
+    across = exponent if p_across is None else checked(semi_axes, p_across)[1]
+    is_one = (exponent == across)[..., None]
+    shapes = np.concatenate(
+        [np.where(is_one, np.sort(axes, axis=-1), axes), exponent[..., None], across[..., None]],
+        axis=-1,
+    )
+    different, which = np.unique(shapes.reshape(-1, 5), axis=0, return_inverse=True)
+    found = np.array([_area_of(row[:3], *row[3:].tolist()) for row in different]).reshape(-1, 2)
     area, error = np.moveaxis(found[which.ravel()].reshape(*exponent.shape, 2), -1, 0)
     return SurfaceArea(area, error)
 
 
-def asphericity(semi_axes: ArrayLike, p: ArrayLike) -> FloatArray:
+def asphericity(
+    semi_axes: ArrayLike, p: ArrayLike, p_across: ArrayLike | None = None
+) -> FloatArray:
     """Asphericity, 1 - (4 pi)^(1/3) (3 V)^(2/3) / A: 0 for a sphere, 1 for a needle or a sheet.
 
     Yuan et al. 2019, Eq. 2. (Their text has 1 for spheres; the right-hand sides of their Eqs. 8
@@ -192,9 +212,9 @@ def asphericity(semi_axes: ArrayLike, p: ArrayLike) -> FloatArray:
     -------
     (...) array of float64
     """
-    of_sphere = np.cbrt(4 * np.pi * (3 * volume(semi_axes, p)) ** 2)
+    of_sphere = np.cbrt(4 * np.pi * (3 * volume(semi_axes, p, p_across)) ** 2)
     # Rounding may give a value just below 0 for a sphere.
-    return np.maximum(0.0, 1 - of_sphere / surface_area(semi_axes, p).area)
+    return np.maximum(0.0, 1 - of_sphere / surface_area(semi_axes, p, p_across).area)
 
 
 def reduced_aspect_ratio(semi_axes: ArrayLike) -> FloatArray:
@@ -220,40 +240,42 @@ def reduced_aspect_ratio(semi_axes: ArrayLike) -> FloatArray:
     return np.asarray((a / b) * (c / b))
 
 
-def _area_of(axes: FloatArray, p: float) -> tuple[float, float]:
-    """Area of one shape and its error."""
+def _area_of(axes: FloatArray, p: float, p_across: float) -> tuple[float, float]:
+    """Area of one shape and its error; with one exponent the axes ascend."""
     size = float(np.cbrt(axes.prod()))
     unit = axes / size
-    if p == 1:
+    if p == p_across == 1:
         a, b, c = unit**2
         area = 4 * np.pi * float(scipy.special.elliprg(a * b, b * c, c * a))
         return size**2 * area, size**2 * area * _CONVERGED
-    scale = 3 * float(volume(unit, p)) * size**2
-    mean, change = _mean_slope(unit, p, _STEPS[0]), np.inf
+    # With one exponent the longest axis stands alone: its corner of the surface is the sharpest.
+    known = None if p == p_across else p_across
+    scale = 3 * float(volume(unit, p, known)) * size**2
+    mean, change = _mean_slope(unit, p, p_across, _STEPS[0]), np.inf
     for step in _STEPS[1:]:
-        before, mean = mean, _mean_slope(unit, p, step)
+        before, mean = mean, _mean_slope(unit, p, p_across, step)
         change = abs(mean - before)
         if change < _CONVERGED * mean:
             break
     return scale * mean, scale * max(change, _CONVERGED * mean)
 
 
-def _mean_slope(axes: FloatArray, p: float, step: float) -> float:
+def _mean_slope(axes: FloatArray, p: float, p_across: float, step: float) -> float:
     """Average of the root in `surface_area`, by the trapezoidal rule.
 
     Both coordinates are (pi/2) sinh(xi). All is kept as logarithms: at p = 10 coordinates reach
     800. The sum of the weights replaces their integral, a product of beta functions.
     """
-    reach = np.arcsinh(_TAIL * 2 * p / (np.pi / 2))
+    reach = np.arcsinh(_TAIL * 2 * max(p, p_across) / (np.pi / 2))
     n = int(np.ceil(reach / step))
     xi = step * np.arange(-n, n + 1)
     y, stretch = np.pi / 2 * np.sinh(xi), np.cosh(xi)
     log_less, log_more = -np.logaddexp(0, -y), -np.logaddexp(0, y)  # of s and of 1 - s
     power, m = 0.5 / p, 2 - 1 / p
+    power_across, m_across = 0.5 / p_across, 2 - 1 / p_across
     outer = stretch * np.exp(power * log_more + 2 * power * log_less)
-    inner = stretch * np.exp(power * (log_more + log_less))
-    # The longest axis stands alone: its corner of the surface is the sharpest.
+    inner = stretch * np.exp(power_across * (log_more + log_less))
     b, c, a = axes
-    pair = np.exp(m * log_less) / b**2 + np.exp(m * log_more) / c**2
+    pair = np.exp(m_across * log_less) / b**2 + np.exp(m_across * log_more) / c**2
     slope = np.sqrt(np.exp(m * log_more)[:, None] / a**2 + np.exp(m * log_less)[:, None] * pair)
     return float(outer @ slope @ inner / (outer.sum() * inner.sum()))

@@ -41,7 +41,8 @@ class Parameter(NamedTuple):
     """A number that describes a particle beside its size, such as an aspect ratio; or a text, of subclasses."""
 
     name: str
-    default: float | str
+    default: float | str | None
+    """None for one that replaces others, and is left out where it is not given."""
     meaning: str
     option: str
     """Name on command lines and in file names."""
@@ -61,12 +62,21 @@ class Parameter(NamedTuple):
     @property
     def usual(self) -> str:
         """The default, for help."""
+        if self.default is None:
+            return "none"
         return self.default if isinstance(self.default, str) else f"{self.default:g}"
 
     @property
     def symbol(self) -> str:
         """TeX symbol, without dollars."""
-        texts = {"alpha": r"\alpha", "exponent": "p", "w1": "w_1", "w2": "w_2"}
+        texts = {
+            "alpha": r"\alpha",
+            "exponent": "p",
+            "w1": "w_1",
+            "w2": "w_2",
+            "n1": "n_1",
+            "n2": "n_2",
+        }
         return texts.get(self.name, self.name)
 
 
@@ -345,6 +355,11 @@ class Shape(ABC):
         return hash(type(self))
 
     @property
+    def needed(self) -> tuple[Parameter, ...]:
+        """Parameters without those that replace others where they are given."""
+        return tuple(p for p in self.parameters if p.default is not None)
+
+    @property
     def compiled_name(self) -> str:
         """Name of its class in `jamshape._contact`, and of the function that makes particles."""
         return f"{self.name.capitalize()}s"
@@ -392,6 +407,11 @@ class Shape(ABC):
             msg = f"a {self.name} has no exponent, expected none; leave it out"
             raise ValueError(msg)
         return np.empty((len(exponent), 0))
+
+    def stored_of(self, form: FloatArray) -> tuple[str, ...]:
+        """Return the fields of a packing with the (N, K) form that files hold of each particle beside its diameters."""
+        is_exponent = self.has_exponent and form.shape[1] == 1
+        return self.stored if is_exponent or not self.has_exponent else ("form",)
 
     def check_form(self, form: FloatArray, dimension: int) -> None:
         """Raise a ValueError unless the (N, K) form, beside diameters, is one of this shape."""
@@ -441,6 +461,22 @@ class Shape(ABC):
         ValueError
             If a parameter is out of its range.
         """
+
+    def told(self, known: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the parameters of a particle among known values; none unless they are complete."""
+        own = {p.name: known[p.name] for p in self.parameters if p.name in known}
+        complete = self.reduced({p.name: p.default for p in self.needed} | own)
+        return own if own.keys() == complete.keys() else {}
+
+    def reduced(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
+        """Return parameters without those that others replace.
+
+        Raises
+        ------
+        ValueError
+            If they exclude each other.
+        """
+        return dict(parameters)
 
     @abstractmethod
     def parameters_of(
@@ -518,7 +554,8 @@ class Shape(ABC):
 
     def label(self, parameters: Mapping[str, Any]) -> str:
         """Format parameters in TeX, for a legend."""
-        told = [f"{p.symbol}={parameters[p.name]:g}" for p in self.parameters]
+        known = (p for p in self.parameters if p.name in parameters)
+        told = [f"{p.symbol}={parameters[p.name]:g}" for p in known]
         return f"${', '.join(told)}$"
 
     def stem(self, parameters: Mapping[str, Any]) -> str:

@@ -23,11 +23,12 @@ class RoundedSegment:
 
 @dataclass(frozen=True, eq=False)
 class Superquadric:
-    """|x/a|^(2/e) + |y/b|^(2/e) + |z/c|^(2/e) = 1 with the roundness e: 1 for ellipsoids, 0 for boxes."""
+    """(|x/a|^(2/e2) + |y/b|^(2/e2))^(e2/e1) + |z/c|^(2/e1) = 1 with the roundness e: 1 for ellipsoids, 0 for boxes."""
 
     semi_axes: FloatArray
     """(3,)"""
-    roundness: float
+    roundness: tuple[float, float]
+    """e1 from pole to pole (OVITO's Phi) and e2 around them (Theta)."""
     GLYPH: ClassVar[str] = "Sphere"
     """OVITO's name; another property sets its roundness."""
 

@@ -20,13 +20,16 @@ _SHARP = 1.3
 _NOTHING = -600.0
 
 
-def surface_mesh(semi_axes: ArrayLike, p: float, level: int = 3) -> SurfaceMesh:
+def surface_mesh(
+    semi_axes: ArrayLike, p: float, level: int = 3, p_across: float | None = None
+) -> SurfaceMesh:
     """Cover a superellipsoid evenly with triangles.
 
     The vertices are those of a sphere's mesh, mapped so that position and normal count equally:
     |x|^2p + ... = 1 with x + n in place of x. So flat sides, edges and tips all get
     their share, at p from 0.5 to 20. The mesh has the symmetry of the body: edges of a box lie on
-    edges of triangles, and so do those of an octahedron.
+    edges of triangles, and so do those of an octahedron. With two exponents this holds of the sections across z,
+    and of their size and z.
 
     Parameters
     ----------
@@ -34,6 +37,8 @@ def surface_mesh(semi_axes: ArrayLike, p: float, level: int = 3) -> SurfaceMesh:
     p : float
     level : int
         Each level makes four triangles of one: 48, 192, 768, 3072 ...
+    p_across : float, optional
+        Half the exponent of sections across z; p by default.
 
     Returns
     -------
@@ -50,15 +55,32 @@ def surface_mesh(semi_axes: ArrayLike, p: float, level: int = 3) -> SurfaceMesh:
         msg = f"{found}, expected (3,) for one body and a level from 0"
         raise ValueError(msg)
     directions, triangles = _sphere(level)
-    q = 2 * float(exponent)
-    log_u = _shares(np.abs(directions), max(q, _SHARP))
     sign = np.sign(directions)
-    normal = sign * np.exp((1 - 1 / q) * log_u) / axes
+    point, slope = _unit_surface(np.abs(directions), 2 * float(exponent), p_across)
+    normal = sign * slope / axes
     return SurfaceMesh(
-        vertices=sign * np.exp(log_u / q) * axes,
+        vertices=sign * point * axes,
         triangles=triangles,
         normals=normal / np.linalg.norm(normal, axis=1, keepdims=True),
     )
+
+
+def _unit_surface(
+    directions: FloatArray, q: float, p_across: float | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return points (V, 3) of a body with semi-axes 1, and their normals, in the first octant."""
+    if p_across is None or 2 * p_across == q:
+        log_u = _shares(directions, max(q, _SHARP))
+        return np.exp(log_u / q), np.exp((1 - 1 / q) * log_u)
+    q_across, across = 2 * p_across, directions[:, :2]
+    outer = _shares(np.column_stack([np.hypot(*across.T), directions[:, 2]]), max(q, _SHARP))
+    inner = _shares(across, max(q_across, _SHARP))
+    log_point = np.column_stack([outer[:, :1] / q + inner / q_across, outer[:, 1] / q])
+    rates = 1 - 1 / q, 1 - 1 / q_across
+    log_slope = np.column_stack(
+        [rates[0] * outer[:, :1] + rates[1] * inner, rates[0] * outer[:, 1]]
+    )
+    return np.exp(log_point), np.exp(log_slope)
 
 
 def _shares(directions: FloatArray, q: float) -> FloatArray:

@@ -10,7 +10,7 @@ BOX = Box(np.array([-1.0, 2.0]), np.array([4.0, 7.0]))
 
 
 def one(shape, **parameters):
-    known = {p.name: p.default for p in SHAPES[shape].parameters} | parameters
+    known = {p.name: p.default for p in SHAPES[shape].needed} | parameters
     diameters, form = SHAPES[shape].sizes(known, np.ones(1))
     return Packing(
         position=np.array([[-20.0, 31.0]]),

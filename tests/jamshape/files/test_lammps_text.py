@@ -5,7 +5,7 @@ from lammps_runs import run_lmp_well
 from nasty import NASTY, assert_identical, nasty_packing, tilted_box
 
 from jamshape.files.h5md import FileFormatError, write_run
-from jamshape.files.lammps_text import read_any, read_data, write_data
+from jamshape.files.lammps_text import read_any, read_data, write_data, write_dump
 from jamshape.packing import Box
 
 RODS = "spherocylinder"
@@ -412,12 +412,53 @@ def test_roundness_alone_tells_the_exponent_to_rounding(path, dimension):
     np.testing.assert_allclose(found.exponent, expected.exponent, rtol=3e-16)
 
 
-def test_bodies_of_two_roundnesses_are_refused(path):
+def with_two_exponents(dimension):
+    n = 1.1 + 18 * np.random.default_rng(6).random((len(NASTY), 2))
+    packing = nasty_packing(dimension, form=n, shape_style="superellipsoid").sorted_by_id()
+    return packing.with_(step=0, time=0.0)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_two_exponents_survive_data_files_and_dumps_to_the_last_bit(path, dimension):
+    expected = with_two_exponents(dimension)
+    write_data(path, expected)
+    assert_identical(read_data(path), expected)
+    write_dump(path, expected)
+    [found] = read_dump(path)
+    np.testing.assert_array_equal(found.form, expected.form)
+
+
+@pytest.mark.parametrize("make", [bodies, with_two_exponents])
+def test_rows_for_lammps_from_2026_on_have_both_exponents(path, make):
+    expected = make(3).with_(step=0, time=0.0)
+    write_data(path, expected, blocks=True)
+    rows = path.read_text().partition("Ellipsoids\n\n")[2].splitlines()
+    assert all(len(row.split()) == 10 and "#" not in row for row in rows)
+    assert_identical(read_data(path), expected)
+
+
+@pytest.mark.parametrize("columns", [["block1", "block2"], ["c_block1", "c_block2"], ROUNDNESS])
+def test_dumps_of_others_tell_two_exponents(path, columns):
+    expected = with_two_exponents(3)
+    head, rows = dump_frame(expected).split("shapez \n")
+    numbers = expected.form if "block" in columns[0] else 2 / expected.form
+    lines = [
+        f"{row}{a:.17g} {b:.17g} \n" for row, (a, b) in zip(rows.splitlines(), numbers, strict=True)
+    ]
+    path.write_text(f"{head}shapez {' '.join(columns)} \n{''.join(lines)}")
+    [found] = read_dump(path)
+    assert found.shape_style == "superellipsoid"
+    np.testing.assert_allclose(found.form, expected.form, rtol=5e-16)
+    with pytest.raises(
+        ValueError, match="two exponents has no p, expected one exponent each; use form"
+    ):
+        _ = found.exponent
+
+
+def test_roundnesses_that_are_not_positive_are_refused(path):
     text = dump_of_bodies(bodies(3), ROUNDNESS)
     head, tail = text.split("Theta \n")
     first, rest = tail.split("\n", 1)
-    path.write_text(f"{head}Theta \n{first.rsplit(' ', 2)[0]} 0.25 \n{rest}")
-    with pytest.raises(
-        FileFormatError, match="differ or are not positive, expected both to be 1/p"
-    ):
+    path.write_text(f"{head}Theta \n{first.rsplit(' ', 2)[0]} -0.25 \n{rest}")
+    with pytest.raises(FileFormatError, match="Theta is not positive, expected 2/n1 and 2/n2"):
         read_dump(path)

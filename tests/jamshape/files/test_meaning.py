@@ -153,9 +153,13 @@ REFUSED = {
         [("Atoms # ellipsoid", "Atoms"), (ATOMS, "1 1 10 10 0 1 1.0\n2 1 10.5 10.8 0 1 1.0")],
         "columns of Atoms are not those of atom_style ellipsoid, expected 1 as ellipsoidflag",
     ),
-    "two blocks": (
-        [("1 0 0 0\n", "1 0 0 0 2.0 4.0\n")],
-        "two block exponents that differ or are not positive, expected both to be 2p",
+    "blocks that are not convex": (
+        [("1 0 0 0\n", "1 0 0 0 2.0 0.9\n")],
+        "exponents hold 0.9, expected n1 and n2 > 1, for which bodies are convex",
+    ),
+    "blocks that are not positive": (
+        [("1 0 0 0\n", "1 0 0 0 2.0 0.0\n")],
+        "block1 or block2 is not positive, expected n1 and n2 of each particle",
     ),
     "a point": (
         [("2 ellipsoids", "1 ellipsoids"), ("\n2 5 1 1 1 0 0 0\n", "\n")],
@@ -210,6 +214,14 @@ def test_blocks_of_lammps_from_2026_on_tell_the_exponent(path):
     np.testing.assert_array_equal(packing.exponent, 1.5)
     with pytest.raises(FileFormatError, match="the file has exponents, which no dimer has"):
         js.load(path, shape="dimer")
+
+
+def test_two_blocks_of_lammps_are_both_exponents(path):
+    path.write_text(changed(("1 0 0 0\n", "1 0 0 0 5.0 3.0\n")))
+    packing = js.load(path)
+    assert (packing.shape_style, packing.dimension) == ("superellipsoid", 2)
+    np.testing.assert_array_equal(packing.form, [[5.0, 3.0]] * 2)
+    np.testing.assert_array_equal(packing.exponent, 1.5)  # that of the plane
 
 
 @pytest.mark.parametrize("height", [(-0.1, 0.1), (-5, 5), (0, 1e-3), (-0.5, 0.5)])
@@ -286,7 +298,7 @@ def test_six_digits_are_said_to_cost_overlaps(path):
 )
 def test_what_we_write_says_what_it_holds(path, name, dimension):
     shape = SHAPES[name]
-    usual = {p.name: p.read(p.default) for p in shape.parameters}
+    usual = {p.name: p.read(p.default) for p in shape.needed}
     diameters, form = shape.sizes(usual, np.array([1.0, 1.3]))
     if shape.has_exponent:
         form = np.array([[1.5], [2.5]])
