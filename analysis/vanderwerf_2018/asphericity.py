@@ -1,4 +1,4 @@
-"""Draw phi_J and z_J against asphericity of shapes in the plane (VanderWerf, Jin, Shattuck & O'Hern, PRE 97, 012909 (2018)).
+"""Draw phi_J and z_J against asphericity: the packings in the plane of VanderWerf, Jin, Shattuck & O'Hern, PRE 97, 012909 (2018).
 
     python analysis/vanderwerf_2018/asphericity.py SWEEP [MORE ...] --out asphericity.png
 

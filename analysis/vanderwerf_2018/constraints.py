@@ -1,4 +1,4 @@
-"""Draw missing contacts against motions that contacts block to second order (VanderWerf, Jin, Shattuck & O'Hern, PRE 97, 012909 (2018)).
+"""Draw missing contacts against blocked motions: the packings in the plane of VanderWerf, Jin, Shattuck & O'Hern, PRE 97, 012909 (2018).
 
     python analysis/vanderwerf_2018/constraints.py SWEEP [MORE ...] --out constraints.png
 

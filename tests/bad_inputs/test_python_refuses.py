@@ -255,5 +255,11 @@ def test_what_is_in_range_is_not_refused():
         require_stated(**{name: number(allowed.low)})
     for shape in SHAPES.values():
         for p in shape.parameters:
+            # Those that replace others come together.
+            with_it = (
+                {}
+                if p in shape.needed
+                else {q.name: 2.0 for q in shape.parameters if q not in shape.needed}
+            )
             for value in (p.allowed.low, p.allowed.high, *p.allowed.also) if p.allowed else ():
-                Particles.of(shape, **{p.name: value})
+                Particles.of(shape, **(with_it | {p.name: value}))

@@ -96,6 +96,10 @@ def test_bad_particles_are_refused(shape, change, sentence):
 def test_vicinities_have_coordinates_of_their_space():
     for dimension, columns in ((2, 3), (3, 6)):
         shape = _contact.Dimers(np.ones((2, 3)), np.ones(2), dimension, 1.0, 1)
-        shape.local_energy_model(np.arange(2 * columns).reshape(2, columns), np.ones(2), np.ones(2))
+        shape.local_energy_model(
+            np.arange(2 * columns).reshape(2, columns), np.ones(2), np.ones(2), 0.1
+        )
         with pytest.raises(ValueError, match=r"do not have shapes \(N, 3\), in space \(N, 6\)"):
-            shape.local_energy_model(np.zeros((2, 9 - columns), np.int64), np.ones(2), np.ones(2))
+            shape.local_energy_model(
+                np.zeros((2, 9 - columns), np.int64), np.ones(2), np.ones(2), 0.1
+            )

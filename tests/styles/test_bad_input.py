@@ -228,9 +228,9 @@ OF_BODIES = "pair_coeff of superellipsoid/harmonic found "
            f"{OF_BODIES}{number} arguments, expected 'I J epsilon' or 'I I epsilon p'.")
           for words, number in (("1 1", 2),)),
         *((f"pair_coeff 1 1 1.0 {value}",
-           (f"{OF_BODIES}p = {value}, expected a finite number above 0.5: particles of other exponents "
-           "are not convex."))
-          for value in ("0.5", "0.0", "-2", "1e400", "1.5 2")),
+           (f"{OF_BODIES}p = {value}, expected a finite number above 0.5, or two numbers n1 n2 above 1, those of "
+           "LAMMPS, where n1 = n2 = 2p is the same body: particles of other exponents are not convex."))
+          for value in ("0.5", "0.0", "-2", "1e400", "1.5 1", "2 2 2")),
         *((f"pair_coeff {types} 1.0 1.5",
            (f"{OF_BODIES}p = 1.5 for types {' and '.join(types.split())}, expected p only for "
            "equal types: it belongs to a type; give it with 'pair_coeff I I epsilon p'."))

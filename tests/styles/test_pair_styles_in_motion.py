@@ -320,7 +320,7 @@ def test_a_restart_goes_on_to_the_last_bit(case):
 
 
 def assert_same_bits(one, other):
-    for name in ("position", "orientation", "diameters", "exponent", "species", "id", "step"):
+    for name in ("position", "orientation", "diameters", "form", "species", "id", "step"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
     for name in ("lo", "edges"):
         np.testing.assert_array_equal(getattr(one.box, name), getattr(other.box, name))

@@ -146,10 +146,12 @@ def _particles(
             msg = f"{name} is unknown for {shape.name}s, expected {expected}"
             raise ValueError(msg)
     texts = {p.option: p for p in shape.parameters if isinstance(p.default, str)}
+    replacing = {p.option for p in shape.parameters if p not in shape.needed}
+    given: dict[str, Any] = {**parameters, **kinds}
     values: dict[str, Any] = {
         k: _texts(texts[k], v) if k in texts else real_numbers(k, v)
-        for k, v in {**parameters, **kinds}.items()
-        if v is not None
+        for k, v in given.items()
+        if v is not None or k not in replacing
     }
     if not kinds and all(np.ndim(value) == 0 for value in values.values()):
         return Particles.of(shape, size_ratio, **{k: v.item() for k, v in values.items()})

@@ -276,7 +276,7 @@ def _with_defaults(shape: Shape, parameters: Mapping[str, Any]) -> dict[str, Any
             msg = f"{name} is not a parameter of {shape.name}s, expected {', '.join(known)}"
             raise ValueError(msg)
     chosen = known | given
-    present = (p for p in shape.parameters if chosen[p.name] is not None)
+    present = (p for p in shape.parameters if p in shape.needed or chosen[p.name] is not None)
     return shape.reduced({p.name: p.read(chosen[p.name]) for p in present})
 
 

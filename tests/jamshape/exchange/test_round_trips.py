@@ -79,7 +79,7 @@ KEPT = {
     "shape": exact(lambda p: p.shape_style),
     "dimension": exact(lambda p: p.dimension),
     "`k_e`, also of each pair of types": exact(lambda p: p.law.k_e),
-    "`sides` of rods": lambda a, b: NO if b.shape_style == "spherocylinder" and a.law != b.law else YES,
+    "`sides` of rods, power of the law": lambda a, b: NO if b.shape_style == "spherocylinder" and a.law != b.law else YES,
     "sizes": exact(lambda p: p.diameters),
     "exponents, discs, corners": exact(lambda p: p.form),
     "IDs and types": exact(lambda p: [p.id, p.species]),

@@ -63,7 +63,7 @@ def test_a_living_state_is_read_with_its_law_and_pushed_back(name, dimension, ma
         np.testing.assert_array_equal(
             again.box.edges, (moved.box.lo + moved.box.edges) - moved.box.lo
         )
-        for field in ("id", "species", "diameters", "exponent"):
+        for field in ("id", "species", "diameters", "form"):
             np.testing.assert_array_equal(getattr(again, field), getattr(moved, field))
         np.testing.assert_allclose(again.quaternions, signed(moved.quaternions, again), atol=1e-15)
 
