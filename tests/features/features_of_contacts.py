@@ -130,7 +130,7 @@ _PAIRS = (
             refused="compute packing found no contacts of the present atoms, .*"),
     Feature("`pair_coeff 2* 1`", "pair_coeff 2* 1 3.0", refused=r"pair_coeff of spherocylinder/harmonic found types '2\* 1', expected I <= J: .*", scene=_TWO),
     Feature("`pair_write`", "pair_write 1 2 10 r 0.5 1 f.txt X", refused="Pair style does not support pair_write", scene=_TWO),
-    Feature("`newton off`", "run 0", "pe", "run 0", 1e-14, scene="newton off\n" + CROWD),
+    Feature("`newton off`", f"clear\nnewton off\n{CROWD}\nrun 0", "pe", "run 0", 1e-14, scene=CROWD),
     Feature("`comm_style tiled`", "comm_style tiled\nbalance 1.1 rcb\nrun 0", "pe", "run 0", 1e-14, scene=CROWD),
     Feature("`neighbor 0 bin`", "neighbor 0 bin\nrun 0", "pe", "run 0", 1e-14, scene=CROWD),
     Feature("`suffix opt`", f"suffix opt\n{_STYLE}\nrun 0", "pe", _ENERGY, scene=_FREE),
