@@ -104,7 +104,8 @@ def label(system: System) -> str:
         or system.kinds
     )
     thermal = f", protocol 2, {system.n_sweeps:g} sweeps"
-    return f"$({shape})$" + thermal * is_thermal(system)
+    law = f", {system.law}" if system.law else ""
+    return f"$({shape})$" + thermal * is_thermal(system) + law
 
 
 def mark(system: System) -> dict[str, Any]:

@@ -96,6 +96,7 @@ def system_labels(systems: Collection[System]) -> dict[System, str]:
         )
         parts += [system_text(system)]
         parts += [protocol_text(system)] * (len(protocols) > 1)
+        parts += [system.law]
         labels[system] = ", ".join(part for part in parts if part)
     return labels
 

@@ -109,6 +109,17 @@ def test_ways_to_jamming_are_told_apart(tmp_path):
     assert system_labels([first, second])[second].endswith(", quasistatic")
 
 
+def test_laws_of_contacts_are_told_apart(tmp_path):
+    write(tmp_path, "a", bidisperse(1), seed=1)
+    write(tmp_path, "b", bidisperse(1).under("hertz"), seed=1)
+    first, second = read_groups([tmp_path])
+    assert (first.law, second.law) == ("", "hertz")
+    assert first._replace(law="hertz") == second
+    assert not of_paper(second)
+    assert second.report()["law"] == "hertz"
+    assert system_labels([first, second])[second] == system_labels([first])[first] + ", hertz"
+
+
 def test_a_mixture_is_named_by_its_kinds(tmp_path):
     packing = random_packing(8, 0.1, 1, bidisperse(1))
     known = {"kinds": "alpha=4,size=1; alpha=0,size=2", "n": 8, "seed": 1, "outcome": "converged"}

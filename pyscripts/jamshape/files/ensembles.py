@@ -1,6 +1,6 @@
 """Finished packings, and the systems to which they belong.
 
-Packings belong to one system if shape, dimension, the shape's parameters, mixture, protocol and its sweeps agree.
+Packings belong to one system if shape, dimension, the shape's parameters, mixture, protocol, its sweeps and the law of contacts agree.
 """
 
 from __future__ import annotations
@@ -38,6 +38,8 @@ class System(NamedTuple):
     """Name of the published protocol, or the way to jamming; empty for compressions in LAMMPS."""
     n_sweeps: int = 0
     """Monte Carlo sweeps."""
+    law: str = ""
+    """Law of contacts; empty for the harmonic one."""
 
     def number(self, name: str) -> float:
         """Look up a parameter; NaN if the shape does not have it."""
@@ -49,8 +51,8 @@ class System(NamedTuple):
         return self._replace(parameters=tuple(p for p in self.parameters if p[0] != name))
 
     def report(self) -> dict[str, Any]:
-        """Return a description for JSON: parameters by name, the last three if present."""
-        told = {name: getattr(self, name) for name in ("kinds", "protocol", "n_sweeps")}
+        """Return a description for JSON: parameters by name, the last four if present."""
+        told = {name: getattr(self, name) for name in ("kinds", "protocol", "n_sweeps", "law")}
         told = {name: value for name, value in told.items() if value}
         return {"shape": self.shape, "dimension": self.dimension, **dict(self.parameters), **told}
 
@@ -131,4 +133,5 @@ def system_of(attributes: Mapping[str, Any], shape: str, dimension: int) -> Syst
     kinds = str(attributes.get("kinds", ""))
     protocol = str(attributes.get("protocol", ""))
     sweeps = int(attributes.get("n_sweeps", 0))
-    return System(shape, dimension, known, kinds, protocol, sweeps)
+    law = str(attributes.get("law", ""))
+    return System(shape, dimension, known, kinds, protocol, sweeps, law)
