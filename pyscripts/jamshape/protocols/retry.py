@@ -22,8 +22,9 @@ from jamshape.minima.target import Search, Target, TargetError, extrapolation, f
 from jamshape.packing import State
 from jamshape.vibration.sliding import Sliding
 
-# Cost of a step along sliding modes, in evaluations (`analysis/outcomes.py price`).
-_PRICE = 500
+# Cost of a step along sliding modes, in evaluations, up to some particles (`analysis/outcomes.py price`), and the power of their
+# number with which it grows beyond: sliding modes are some tenth of all, and found together.
+_PRICE, _UP_TO, _POWER = 500, 256, 1.5
 
 # Evaluations in which forces balance if they can; otherwise they would use up any number.
 _EVALUATIONS = 100
@@ -75,7 +76,9 @@ class Retry:
     @property
     def work(self) -> int:
         """Work done, [evaluations]."""
-        return self.evaluations + _PRICE * max(self.n_steps, 0)
+        n = len(self.state.position)
+        price = int(_PRICE * max(1.0, n / _UP_TO) ** _POWER)
+        return self.evaluations + price * max(self.n_steps, 0)
 
     @property
     def is_over(self) -> bool:

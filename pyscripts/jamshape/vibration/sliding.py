@@ -24,13 +24,16 @@ from jamshape.vibration.hessian import (
     dynamical_matrix,
     lengths_of_bonds,
 )
-from jamshape.vibration.sparse_modes import lowest, typical_prestress
+from jamshape.vibration.sparse_modes import below_sliding, near, typical_prestress
 
 # Modes softer than this fraction of the prestress vanish at first order in it.
 _FIRST_ORDER = 1e-2
 
 # Forces below this fraction of the root of the prestress (over the stiffness) are of second order in the overlap.
 _WEAK = 0.1
+
+# Modes that are asked for beyond those without a bond, since some bonds are redundant.
+_MORE = 16
 
 # Scale of the perturbation to measure surface distances, relative to the longest step.
 _LEVELS = (1e-6, 1e-4, 1e-2, 1.0)
@@ -191,13 +194,14 @@ def _softest(matrix: DynamicalMatrix) -> tuple[FloatArray, FloatArray]:
     """Find the modes that vanish at first order in the prestress."""
     limit = _FIRST_ORDER * typical_prestress(matrix)
     most = matrix.size - matrix.translations.shape[1] - 2
-    k = min(most, max(8, matrix.size - matrix.n_bonds + 4))
+    k = min(most, max(8, matrix.size - matrix.n_bonds + _MORE))
     while True:
-        found = lowest(matrix, k)
+        # Modes that are stiffer need not be resolved, so that one shift suffices.
+        found = near(matrix, k, below_sliding(matrix))
         soft = found.eigenvalues < limit
         if not soft.all() or k == most:
             return found.eigenvalues[soft], found.vectors[:, soft]
-        k = min(2 * k, most)
+        k = min(k + max(_MORE, k // 4), most)
 
 
 def _walls(landscape: Landscape, state: State, matrix: DynamicalMatrix, reach: float) -> Walls:
