@@ -125,6 +125,7 @@ def test_ranges_of_energies_follow_the_law(law, u0):
         js.make_packing(js.Spherocylinders(law=law), u0=u0, progress=False)
 
 
+@pytest.mark.lammps
 @pytest.mark.parametrize("law", ["hertz", 4.0])
 def test_explicit_and_implicit_steps_agree(law):
     """Steady shear of a dense start: stages of implicit steps are minimisations."""
@@ -140,6 +141,7 @@ def test_explicit_and_implicit_steps_agree(law):
     assert np.isfinite(pressures).all()
 
 
+@pytest.mark.lammps
 def test_a_file_of_another_law_is_refused(tmp_path):
     """Either way, of packings, of compressions in LAMMPS and of implicit ones."""
     hertz, harmonic = (js.Spherocylinders(alpha=0, law=law) for law in ("hertz", "harmonic"))
