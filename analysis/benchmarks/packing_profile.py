@@ -73,7 +73,7 @@ class Profile:
     @contextmanager
     def counting(self) -> Iterator[None]:
         """Count all minimisations of steps and of the search in this process, as long as it is entered."""
-        compiled = compiled_vicinity()
+        compiled = importlib.import_module("jamshape._contact").LocalEnergyModel
         descend = compiled.descend
 
         def counted(*arguments: Any) -> Any:
@@ -106,11 +106,6 @@ class Profile:
             return found
 
         return counted
-
-
-def compiled_vicinity() -> Any:
-    """Give the class whose minimisations tell of factorisations and products."""
-    return importlib.import_module("jamshape._contact").LocalEnergyModel
 
 
 def parser() -> ArgumentParser:

@@ -72,11 +72,10 @@ def blocked_motions(matrix: DynamicalMatrix, rotation_length: FloatArray) -> Int
     for contact, curvature in enumerate(matrix.curvature):
         scale = np.ones(len(curvature))
         scale[-2 * turns :] = 1 / np.repeat(lengths[contact], turns)
-        gradient = matrix.bonds.gradient[matrix.bonds.contact == contact] * scale
-        along = null_space(gradient)
-        second = along.T @ (curvature * np.outer(scale, scale)) @ along
-        least = _ZERO * np.abs(curvature * np.outer(scale, scale)).max()
-        found[contact] = np.count_nonzero(np.linalg.eigvalsh(second) > least)
+        scaled = curvature * np.outer(scale, scale)
+        along = null_space(matrix.bonds.gradient[matrix.bonds.contact == contact] * scale)
+        second = np.linalg.eigvalsh(along.T @ scaled @ along)
+        found[contact] = np.count_nonzero(second > _ZERO * np.abs(scaled).max())
     return found
 
 

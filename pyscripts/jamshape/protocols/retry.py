@@ -22,8 +22,8 @@ from jamshape.minima.target import Search, Target, TargetError, extrapolation, f
 from jamshape.packing import State
 from jamshape.vibration.sliding import Sliding
 
-# Cost of a step along sliding modes, in evaluations, up to some particles (`analysis/outcomes.py price`), and the power of their
-# number with which it grows beyond: sliding modes are some tenth of all, and found together.
+# Price of a step along sliding modes, in evaluations (`analysis/outcomes.py price`), up to this number of particles, and the power
+# of it with which the price grows beyond: all sliding modes are found together.
 _PRICE, _UP_TO, _POWER = 500, 256, 1.5
 
 # Evaluations in which forces balance if they can; otherwise they would use up any number.
