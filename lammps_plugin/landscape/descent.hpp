@@ -308,7 +308,7 @@ class Descent {
   void learn(const Line &line, const LandscapeSums &from)
   {
     if (by_newton) {
-      system.learn(line.tries);
+      system.learn(line.tries, line.sums.n_bonds > from.n_bonds);
     } else {
       memory.learn(line.x, line.sums.gradient - from.gradient);
     }
