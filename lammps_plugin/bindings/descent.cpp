@@ -96,14 +96,14 @@ void export_descent(nb::module_ &m)
       .def(
           "__init__",
           [](DescentStop *place, double tolerance, double lowest, std::int64_t evaluations,
-             double seconds, double rounding, double newton_below, bool is_near,
-             double longest_step, double widest_turn) {
-            new (place)
-                DescentStop{tolerance, lowest,       evaluations, seconds,
-                            rounding,  newton_below, is_near,     {longest_step, widest_turn}};
+             double seconds, double rounding, std::int64_t patience, double newton_below,
+             bool is_near, double longest_step, double widest_turn) {
+            new (place) DescentStop{tolerance,    lowest,  evaluations,
+                                    seconds,      rounding, patience,
+                                    newton_below, is_near, {longest_step, widest_turn}};
           },
-          "tolerance"_a, "lowest"_a, "evaluations"_a, "seconds"_a, "rounding"_a, "newton_below"_a,
-          "is_near"_a, "longest_step"_a, "widest_turn"_a);
+          "tolerance"_a, "lowest"_a, "evaluations"_a, "seconds"_a, "rounding"_a, "patience"_a,
+          "newton_below"_a, "is_near"_a, "longest_step"_a, "widest_turn"_a);
   nb::class_<DescentEnd>(m, "DescentEnd")
       .def_prop_ro("outcome", [](const DescentEnd &end) { return name_of(end.outcome); })
       .def_prop_ro("sums", [](const DescentEnd &end) { return tuple_of(end.sums); })

@@ -223,6 +223,7 @@ class DescentStop:
         evaluations: int,
         seconds: float,
         rounding: float,
+        patience: int,
         newton_below: float,
         is_near: bool,
         longest_step: float,
