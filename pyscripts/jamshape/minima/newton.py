@@ -33,7 +33,7 @@ def newton(descent: Descent) -> Outcome:
 
 
 def _descend(descent: Descent, newton_below: float, *, is_near: bool = False) -> Outcome:
-    """Minimise; from where that stalls without a kink, follow what slides as long as it moves."""
+    """Minimise; after a stall without a kink, follow sliding particles with more patience."""
     outcome = descent.outcome()
     if outcome is None:
         outcome = _run(descent, newton_below, _PATIENCE, is_near=is_near)
