@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from docutils import nodes
+from latex2mathml.converter import convert
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
+from sphinx.writers.html5 import HTML5Translator
 
 import jamshape
 from jamshape.commands import COMMANDS, options_of
@@ -41,6 +43,8 @@ napoleon_use_rtype = False
 
 highlight_language = "none"  # of commands and decks; Python says that it is Python
 
+# Formulas are MathML in the pages: browsers set them without scripts and without the network.
+html_math_renderer = "mathml"
 html_theme = "furo"
 html_title = "jamshape"
 html_show_sourcelink = False
@@ -97,8 +101,22 @@ class CommandsHelp(SphinxDirective):
         return found
 
 
+def write_formula(writer: HTML5Translator, node: nodes.math) -> None:
+    """Write a formula within a line."""
+    writer.body.append(convert(node.astext()))
+    raise nodes.SkipNode
+
+
+def write_equation(writer: HTML5Translator, node: nodes.math_block) -> None:
+    """Write a displayed formula, in a box that scrolls where a screen is narrower."""
+    equation = convert(node.astext(), display="block")
+    writer.body.append(f'<div class="math" style="overflow-x: auto">{equation}</div>')
+    raise nodes.SkipNode
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
     """Add what pages of this site need."""
     app.connect("source-read", read_page)
     app.add_directive("commands-help", CommandsHelp)
+    app.add_html_math_renderer("mathml", (write_formula, None), (write_equation, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}

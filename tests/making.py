@@ -6,7 +6,6 @@ from jamshape.recording.recorder import How
 STAGES = {
     "opening of the box": "compression",
     "search for a strict minimum": "strict",
-    "second attempt": "retry",
     "Monte Carlo": "Monte Carlo",
 }
 
@@ -15,7 +14,7 @@ class StoppedError(Exception):
     """Raised where a process would be killed."""
 
 
-def made(recipe, out, after=None, *, again=False, retry=True):
+def made(recipe, out, after=None, *, again=False):
     """Make a packing, and return the progress that it told, up to a number of rows."""
     told = []
 
@@ -25,7 +24,7 @@ def made(recipe, out, after=None, *, again=False, retry=True):
             raise StoppedError
 
     try:
-        make(recipe, out, How(again, tell=tell), retry=retry)
+        make(recipe, out, How(again, tell=tell))
     except StoppedError:
         assert again or not is_done(out)
     return told

@@ -181,7 +181,7 @@ def of_iteration(packing: Packing, state: State) -> float:
     landscape = Landscape(packing)
     stop = DescentStop(
         tolerance=0.0, lowest=0.0, evaluations=ITERATIONS, seconds=np.inf, rounding=0.0,
-        newton_below=0.0, is_near=False, longest_step=LONGEST_STEP * 0.5 * landscape.length,
+        patience=ITERATIONS, newton_below=0.0, is_near=False, longest_step=LONGEST_STEP * 0.5 * landscape.length,
         widest_turn=WIDEST_TURN,
     )  # fmt: skip
     times = []

@@ -29,7 +29,7 @@ _IDENTITY = (
 )
 
 # Attributes that describe the search for the packing itself, not for a rung.
-_OF_SOURCE = ("strict", "retry_", "n_negative", "n_kinked", "lowest_eigenvalue")
+_OF_SOURCE = ("strict", "n_negative", "n_kinked", "lowest_eigenvalue")
 
 
 class Rung(NamedTuple):

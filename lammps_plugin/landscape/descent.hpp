@@ -21,6 +21,7 @@ struct DescentStop {
   std::int64_t evaluations;  // exhausted after this many
   double seconds;            // or after this time
   double rounding;           // residual due to rounding of doubles, times the mean force of a bond
+  std::int64_t patience;     // stalled after this many without a gain
   double newton_below;       // residual below which Newton's method replaces L-BFGS
   bool is_near;              // also starts with Newton's method, as long as that gains
   StepBounds step;
@@ -131,9 +132,6 @@ class Descent {
   /// A gain of a method is a fall of the energy or of the residual below these fractions of its
   /// lowest value; either may fall for long while the other does not.
   static constexpr double LESS_ENERGY = 0.98, LESS_RESIDUAL = 0.7;
-  /// Evaluations without a gain after which a method no longer gains.
-  static constexpr std::int64_t PATIENCE = 500;
-
   /// L-BFGS gains in waves: Newton's method takes over only after this many evaluations without a
   /// gain.
   static constexpr std::int64_t SLOW = 2000;
@@ -308,7 +306,7 @@ class Descent {
   void learn(const Line &line, const LandscapeSums &from)
   {
     if (by_newton) {
-      system.learn(line.tries);
+      system.learn(line.tries, line.sums.n_bonds > from.n_bonds);
     } else {
       memory.learn(line.x, line.sums.gradient - from.gradient);
     }
@@ -368,8 +366,8 @@ class Descent {
       outcome = DescentOutcome::CONVERGED;
     } else if (evaluations >= stop.evaluations || rows.back().seconds >= stop.seconds) {
       outcome = DescentOutcome::EXHAUSTED;
-    } else if (evaluations > last_gain + SLOW + 2 * PATIENCE ||
-               (by_newton && evaluations > best + PATIENCE)) {
+    } else if (evaluations > last_gain + SLOW + 2 * stop.patience ||
+               (by_newton && evaluations > best + stop.patience)) {
       outcome = DescentOutcome::STALLED;
     } else {
       return false;

@@ -90,10 +90,16 @@ class NewtonSystem {
   }
 
   /// Lowers the shift after a step that was accepted at once, raises it after one that was far off.
-  void learn(int tries)
+  /// A contact that closed and stopped the step says nothing about the matrix: complete factors
+  /// take it in next, at any shift; iterations take longer the lower the shift.
+  void learn(int tries, bool has_closed)
   {
-    if (tries == 1) shift /= DECAY;
-    if (tries > FAR_OFF) shift *= GROWTH;
+    const bool is_right = tries == 1 || (has_closed && about.has_complete_factors());
+    if (is_right) {
+      shift /= DECAY;
+    } else if (tries > FAR_OFF) {
+      shift *= GROWTH;
+    }
   }
 
  private:

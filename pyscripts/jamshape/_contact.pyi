@@ -223,6 +223,7 @@ class DescentStop:
         evaluations: int,
         seconds: float,
         rounding: float,
+        patience: int,
         newton_below: float,
         is_near: bool,
         longest_step: float,
@@ -243,7 +244,7 @@ class NewtonSystem:
     def __init__(self, local_model: LocalEnergyModel, shift: float) -> None: ...
     def prepare(self) -> None: ...
     def solve(self, right: _Reals, accuracy: float) -> _Reals: ...
-    def learn(self, tries: int) -> None: ...
+    def learn(self, tries: int, has_closed: bool) -> None: ...
 
 class LocalEnergyModel:
     poses: tuple[_Reals, _Reals, _Reals]

@@ -25,7 +25,7 @@ QUICK = {"phi_start": 0.55, "u0": 1e-6, "n": 16}
 PACKINGS = {
     "quasistatic": (RODS, QUICK),
     "strict": (LONG, {"n": 16, "u0": 1e-10, "seed": 5, "strict": True}),
-    "second attempt": (LONG, {"n": 16, "u0": 1e-12, "seed": 34}),
+    "long rods": (LONG, {"n": 16, "u0": 1e-12, "seed": 34}),
     "equal steps": (RODS, QUICK | {"protocol": "steps", "delta_phi": 5e-3}),
     "Monte Carlo": (
         js.Superellipsoids(p=1.5),
@@ -86,7 +86,7 @@ def put_down(name, file):
     assert stops > 2
 
 
-@pytest.mark.parametrize("name", quick(PACKINGS, {"second attempt", "equal steps", "dynamics"}))
+@pytest.mark.parametrize("name", quick(PACKINGS, {"long rods", "equal steps", "dynamics"}))
 def test_a_packing_put_down_again_and_again_ends_as_if_it_were_not(name, whole, tmp_path):
     file = tmp_path / "packing.h5"
     code = ended(forked(put_down, (name, file), tmp_path / "said.log", (*MARKS, *NONE)), 240)

@@ -11,9 +11,8 @@ the energy density u0. --protocol selects slow compression in LAMMPS or equal st
 paper, with its values as defaults: marschall-2018 with a compression at one rate and the energy of Sec. III C, yuan-2019-1
 and yuan-2019-2 with the steps of Sec. 2.2.
 
-The last line of standard output is one JSON object; the exit code is 0 only if forces balance to --tolerance. If not,
-there is a second attempt, as long as the first one. Until it is done, files beside the result hold its state, from
-which the same command resumes.
+The last line of standard output is one JSON object; the exit code is 0 only if forces balance to --tolerance. Until
+the packing is done, files beside the result hold its state, from which the same command resumes.
 """
 
 from __future__ import annotations

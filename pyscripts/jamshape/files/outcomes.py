@@ -54,8 +54,7 @@ def shortfall(known: Mapping[str, Any]) -> str:
     if not _is_balanced(known):
         found = f"with net forces up to {_residual(known):.2g} of the mean force of a bond"
         most = f", expected at most {_tolerance(known):g}" if "tolerance" in known else ""
-        again = " after a second attempt" if "retry_of" in known else ""
-        return f"it ended {known['outcome']}{again}, {found}{most}"
+        return f"it ended {known['outcome']}, {found}{most}"
     if n := _n_negative(known):
         return f"{n} of its modes have a negative eigenvalue, expected none"
     if _is_unstable(known):

@@ -147,7 +147,7 @@ def make_packing(
     Warns
     -----
     NotReachedWarning
-        If forces do not balance to the tolerance, even after a second attempt of equal length.
+        If forces do not balance to the tolerance.
 
     Examples
     --------

@@ -12,6 +12,10 @@ from jamshape.minima.nonsmooth import at_rest
 # L-BFGS, cheap while contacts open and close, hands over to Newton's method below this residual.
 _NEWTON_BELOW = 1e-2
 
+# Evaluations without a gain after which a minimisation has stalled: on a kink; or, if there is none, where rods or flat sides
+# slide, which lowers the energy by little up to the next contact.
+_PATIENCE, _LONG_PATIENCE = 500, 5000
+
 
 def auto(descent: Descent) -> Outcome:
     """Use L-BFGS, then Newton's method near a minimum."""
@@ -29,15 +33,26 @@ def newton(descent: Descent) -> Outcome:
 
 
 def _descend(descent: Descent, newton_below: float, *, is_near: bool = False) -> Outcome:
+    """Minimise; after a stall without a kink, follow sliding particles with more patience."""
+    outcome = descent.outcome()
+    if outcome is None:
+        outcome = _run(descent, newton_below, _PATIENCE, is_near=is_near)
+    if outcome is Outcome.STALLED:
+        outcome = _run(descent, math.inf, _LONG_PATIENCE)
+    return outcome
+
+
+def _run(
+    descent: Descent, newton_below: float, patience: int, *, is_near: bool = False
+) -> Outcome:
     landscape, stop = descent.landscape, descent.stop
-    if outcome := descent.outcome():
-        return outcome
     about = DescentStop(
         tolerance=stop.tolerance,
         lowest=descent.lowest * descent.state.volume,
         evaluations=stop.evaluations - descent.evaluations,
         seconds=stop.seconds - descent.seconds,
         rounding=rounding_of_a_bond(landscape, extended=False),
+        patience=patience,
         newton_below=newton_below,
         is_near=is_near,
         longest_step=LONGEST_STEP * 0.5 * landscape.length,

@@ -22,7 +22,6 @@ from jamshape.minima.boxes import ISOTROPIC, Yielding
 from jamshape.minima.target import Search, Target, TargetError, extrapolation, fraction_of_energy
 from jamshape.packing import Packing
 from jamshape.protocols.recipe import Aim
-from jamshape.protocols.retry import Retry, go_on
 from jamshape.recording.driver import Plan, Row, Told
 
 _FALLEN = 1e-2  # fraction of u0 below which the box was opened too far
@@ -45,7 +44,7 @@ def bring(landscape: Landscape, state: State, goal: Aim) -> Minimum:
     Returns
     -------
     Minimum
-        At rest, or as near to it as a second attempt (`protocols.retry`) comes.
+        At rest, or as near to it as the search comes.
 
     Raises
     ------
@@ -56,17 +55,11 @@ def bring(landscape: Landscape, state: State, goal: Aim) -> Minimum:
     """
     if isinstance(goal, Yielding):
         return goal.find(landscape, state)
-    before = landscape.evaluations
     search = Search(_opened(landscape, state, goal), goal.step)
     for _ in extrapolation(landscape, search, goal):
         pass
     assert search.minimum is not None
-    if search.minimum.is_at_rest:
-        return search.minimum
-    retry = Retry(search.minimum.state, landscape.evaluations - before)
-    for _ in go_on(landscape, retry, goal):
-        pass
-    return retry.minimum or search.minimum
+    return search.minimum
 
 
 def _opened(landscape: Landscape, state: State, goal: Target) -> State:

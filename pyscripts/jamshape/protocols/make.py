@@ -1,7 +1,7 @@
 """The pipeline of a packing, of any shape and dimension, as a driver of stages.
 
 A random start; compression to jamming, by dynamics, by quasistatic steps or at a fixed rate; the search for the
-target energy, if any; a strict minimum or a second attempt; all measurements; and the file. Compressions in LAMMPS
+target energy, if any; a strict minimum, if asked for; all measurements; and the file. Compressions in LAMMPS
 are runs with a file of their own, ``OUT.run.h5``, which serves searches for other energies; all other stages share one
 file until the packing is finished, ``OUT.making.h5``, from which an interrupted call goes on.
 """
@@ -50,7 +50,6 @@ from jamshape.protocols.stages import (
     Compressing,
     Making,
     Minimising,
-    Retrying,
     Searching,
     Settling,
     Stage,
@@ -87,10 +86,8 @@ _SIZES = Sizes(600, 300)
 _OF_SEARCH = ("phi_start", "search", "start", "protocol")
 
 
-def make(recipe: Recipe, out: Path, how: How = How(), *, retry: bool = True) -> None:  # noqa: B008
+def make(recipe: Recipe, out: Path, how: How = How()) -> None:  # noqa: B008
     """Make a packing and write it to `out`, or go on with an interrupted call.
-
-    Where forces do not balance at the energy, there is a second attempt (`protocols.retry`).
 
     Parameters
     ----------
@@ -99,8 +96,6 @@ def make(recipe: Recipe, out: Path, how: How = How(), *, retry: bool = True) -> 
         Replaced when the packing is found.
     how : How
         With `again`, all stages begin anew, but for a compression in LAMMPS that serves this recipe.
-    retry : bool
-        Whether to make a second attempt.
 
     Raises
     ------
@@ -112,7 +107,7 @@ def make(recipe: Recipe, out: Path, how: How = How(), *, retry: bool = True) -> 
         As `jamshape.recording.recorder.record`.
     """
     how = _after_compression(recipe, out, how)
-    plan = _plan(recipe, run_file(recipe, out), partial(Pipeline.write, out=out), retry=retry)
+    plan = _plan(recipe, run_file(recipe, out), partial(Pipeline.write, out=out))
     record(_making_file(out), plan, how)
 
 
@@ -141,15 +136,13 @@ def made(recipe: Recipe, how: How = How()) -> Packing:  # noqa: B008
     return found[0]
 
 
-def _plan(
-    recipe: Recipe, source: Path | None, finish: Callable[[Any], None], *, retry: bool = True
-) -> Plan:
+def _plan(recipe: Recipe, source: Path | None, finish: Callable[[Any], None]) -> Plan:
     def begin() -> Pipeline:
-        return Pipeline(recipe, source, None, retry=retry)
+        return Pipeline(recipe, source, None)
 
     def restore(first: Packing, checkpoint: Checkpoint) -> Pipeline:
         del first
-        return Pipeline(recipe, source, checkpoint, retry=retry)
+        return Pipeline(recipe, source, checkpoint)
 
     return Plan(MAKING, "a packing", recipe.identity, begin, restore, finish=finish)
 
@@ -236,16 +229,14 @@ class Pipeline:
         File of the compression in LAMMPS.
     checkpoint : Checkpoint, optional
         From which to go on.
-    retry : bool
-        Whether to make a second attempt where forces do not balance.
     """
 
     at_mark = True
 
     def __init__(
-        self, recipe: Recipe, source: Path | None, checkpoint: Checkpoint | None, *, retry: bool
+        self, recipe: Recipe, source: Path | None, checkpoint: Checkpoint | None
     ) -> None:
-        self._recipe, self._source, self._retry = recipe, source, retry
+        self._recipe, self._source = recipe, source
         told = checkpoint or {"stage": 0, "frame": -1, "wall_seconds": 0.0, "evaluations": 0}
         self._began = time.perf_counter() - told["wall_seconds"]
         start = recipe.start() if source is None else frame_of(source, told["frame"])
@@ -277,14 +268,11 @@ class Pipeline:
         return found + [finding, self._last] * bool(recipe.target)
 
     def _last(self, making: Making, checkpoint: Checkpoint | None) -> Stage | None:
-        """Begin a strict search or a second attempt, where there is to be one."""
+        """Begin a strict search, where there is to be one."""
         assert making.minimum
-        if making.minimum.outcome is Outcome.UNJAMMED:
+        if making.minimum.outcome is Outcome.UNJAMMED or not self._recipe.strict:
             return None
-        if self._recipe.strict:
-            return Strengthening(making, checkpoint)
-        needs = self._retry and self._recipe.is_searched and not making.minimum.is_at_rest
-        return Retrying(making, checkpoint) if needs else None
+        return Strengthening(making, checkpoint)
 
     def _begin_stage(self, checkpoint: Checkpoint | None = None) -> None:
         """Begin the present stage, or the next one that there is to be; at the end there is none."""

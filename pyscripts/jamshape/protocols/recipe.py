@@ -356,11 +356,6 @@ class Recipe:
         """Target, or fixed box; None for the first jammed packing."""
         return self.way.goal if isinstance(self.way, Given) else self.target
 
-    @property
-    def is_searched(self) -> bool:
-        """Whether there is a search for an energy, and it is ours, not a published one."""
-        return isinstance(self.goal, Target) and self.way.search == "extrapolation"
-
     def attributes(self) -> dict[str, Any]:
         """Return its identifying attributes."""
         strict = {"strict": True} if self.strict else {}

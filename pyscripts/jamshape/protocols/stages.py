@@ -25,10 +25,9 @@ from jamshape.minima.target import (
     extrapolate,
 )
 from jamshape.packing import State
-from jamshape.protocols import quasistatic, retry, strict, thermal
+from jamshape.protocols import quasistatic, strict, thermal
 from jamshape.protocols.quasistatic import QuasistaticRun
 from jamshape.protocols.recipe import Aim, Given, Recipe, Steps
-from jamshape.protocols.retry import Retry
 from jamshape.protocols.strict import StrictSearch
 from jamshape.protocols.thermal import Thermal, without_overlaps
 from jamshape.recording.driver import Told
@@ -442,38 +441,3 @@ class Strengthening:
         making.attributes |= search.counts()
         if search.proof is not None:  # else it has unjammed, at a fixed box
             making.attributes |= search.proof.attributes()
-
-
-class Retrying:
-    """Second attempt at a packing whose forces do not balance, for as much work as it has taken so far."""
-
-    def __init__(self, making: Making, checkpoint: Checkpoint | None) -> None:
-        assert making.minimum is not None
-        self._making, self._first = making, making.minimum
-        told = checkpoint or {"state": making.minimum.state, "budget": making.landscape.evaluations}
-        self._retry = Retry(**told)
-
-    @property
-    def done(self) -> bool:
-        """Whether the packing is found, or the work used up."""
-        return self._retry.is_over
-
-    def advance(self) -> Told:
-        """Take a step."""
-        at, making = self._retry, self._making
-        retry.advance(making.landscape, at, making.target)
-        text = (
-            f"step {max(at.n_steps, 0)}, {at.work} of the work of {at.budget} evaluations, after a minimum that"
-            f" ended {self._first.outcome.value} with a residual of {self._first.residual.largest:.1e}"
-        )
-        return making.told("second attempt", text, at.state, min(1.0, at.work / at.budget))
-
-    def checkpoint(self) -> Checkpoint:
-        """Return the attempt; before its end it has no minimum."""
-        return vars(self._retry) | {"minimum": None}
-
-    def end(self) -> None:
-        """Hand on the better packing, if it was found."""
-        making = self._making
-        making.minimum = self._retry.minimum or self._first
-        making.attributes |= {"retry_of": self._first.outcome.value} | self._retry.counts()
