@@ -2,11 +2,13 @@
 
     python3 tests/debian/suite_in_a_root.py --root /var/tmp/trixie
     python3 tests/debian/suite_in_a_root.py --root /var/tmp/bookworm --release bookworm
+    python3 tests/debian/suite_in_a_root.py --root /var/tmp/forky --release forky
     python3 tests/debian/suite_in_a_root.py --root /var/tmp/trixie -- tests/styles -x
 
 As root, where `debootstrap`, `git` and `unshare` are; half an hour on two cores, and 4 GB. debootstrap makes a smallest
 Debian in the folder, the newest commit of this clone is checked out there, and `./run setup` and `./run test` run in it
-by `chroot`. A folder that is there already is used again: then only what has changed is installed and compiled. What
+by `chroot`. A folder that is there already is used again: its Debian is upgraded, so that a release in the making is
+that of today, and only what has changed is installed and compiled. What
 runs has its own table of mounts and of processes, which go when it ends, in whatever way. Variables of the environment
 for proxies, pip and OpenBLAS are passed on. The folder stays; it can be removed with `rm -r`.
 """
@@ -27,7 +29,9 @@ from pathlib import Path
 CLONE = Path(__file__).resolve().parents[2]
 INSIDE = "root/jamshape"  # the clone in the folder
 CERTIFICATES = "root/certificates.pem"
-RELEASES = {"bookworm": "12", "trixie": "13"}
+RELEASES = {"bookworm": "12", "trixie": "13", "forky": "14"}
+SCRIPTS = Path("/usr/share/debootstrap/scripts")
+MIRROR = "http://deb.debian.org/debian"
 ADVICE = "see that there is a network, or name another mirror with --mirror"
 
 PASSED_ON = re.compile(
@@ -92,9 +96,9 @@ def bootstrap(root, release, mirror):
     if root.is_dir() and any(root.iterdir()):
         require_release(root, release)
         return False
-    code, last = said_by(
-        "debootstrap", "--variant=minbase", release, root, *([mirror] if mirror else [])
-    )
+    # A release younger than this debootstrap is made as unstable is.
+    like = () if (SCRIPTS / release).exists() else (SCRIPTS / "sid",)
+    code, last = said_by("debootstrap", "--variant=minbase", release, root, mirror, *like)
     told = last[-1] if last else "no word"
     require(code == 0, f"debootstrap ended with '{told}', expected {release} in {root}: {ADVICE}")
     return True
@@ -136,6 +140,17 @@ def take_clone(root):
         [*git, "log", "-1", "--format=%h"], capture_output=True, text=True, check=True
     )
     return done.stdout.strip()
+
+
+def upgrade(root):
+    """Bring the packages of an earlier run to the state of today."""
+    for words in (("update", "-q"), ("dist-upgrade", "-qy", "--no-install-recommends")):
+        code, last = said_by(
+            *inside(root, "apt-get", *words),
+            env=environment() | {"DEBIAN_FRONTEND": "noninteractive"},
+        )
+        told = last[-1] if last else "no word"
+        require(code == 0, f"apt-get {words[0]} ended with '{told}' in {root}, expected 0: {ADVICE}")
 
 
 # --- inside ---------------------------------------------------------------------------------------
@@ -189,6 +204,8 @@ def set_up_and_test(root, options):
     bootstrapped = minutes(time.monotonic() - began) if is_new else "was there"
     take_network(root)
     commit = take_clone(root)
+    if not is_new:
+        upgrade(root)
     code, _, seconds = run_there(root, "setup")
     require(code == 0, f"./run setup ended with {code} in {root}, expected 0: see above")
     set_up = minutes(seconds)
@@ -219,7 +236,7 @@ def main():
     parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
     parser.add_argument("--root", type=Path, required=True, help="folder, new or of an earlier run")
     parser.add_argument("--release", choices=RELEASES, default="trixie", help="(trixie)")
-    parser.add_argument("--mirror", metavar="URL", help="of Debian's packages (debootstrap's own)")
+    parser.add_argument("--mirror", metavar="URL", default=MIRROR, help=f"of packages ({MIRROR})")
     parser.add_argument("words", nargs="*", help="go to ./run test, behind --")
     options = parser.parse_args()
     root = options.root.resolve()
