@@ -33,7 +33,8 @@ void ParticleView::find_ellipsoids(const std::string &style)
   if (!ellipsoids) {
     error->all(FLERR,
                style + " found atom_style " + atom->atom_style +
-                   ", expected ellipsoid: use 'atom_style ellipsoid' and give every atom a shape.");
+                   ", expected ellipsoid: use 'atom_style ellipsoid', behind 'suffix off' if an "
+                   "accelerator adds one, and give every atom a shape.");
   }
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!has_shape(i)) continue;
