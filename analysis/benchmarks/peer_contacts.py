@@ -1,4 +1,4 @@
-"""Contacts of LAMMPS's own superellipsoids, `pair_style granular/superellipsoid`, beside ours, on the same pairs.
+"""Contacts of LAMMPS's own superellipsoids, `pair_style granular/superellipsoid`, compared with jamshape's, on the same pairs.
 
     python analysis/benchmarks/peer_contacts.py
     python analysis/benchmarks/peer_contacts.py --pairs 4000 --exponents 2 2 4 2

@@ -114,8 +114,8 @@ JAMSHAPE_EITHER(fixes, std::vector(of->get_fix_list()),
 JAMSHAPE_EITHER(computes, std::vector(of->get_compute_list()),
                 std::vector(of->compute, of->compute + of->ncompute))
 
-/// Where LAMMPS looks up the creators of styles: a registry of the process since the summer of
-/// 2026, before then a table of each instance.
+/// The creators of styles by name: a registry of the process since the summer of 2026, before then
+/// a table of each instance.
 JAMSHAPE_EITHER(pair_styles, of->pair_styles(), of->pair_map)
 JAMSHAPE_EITHER(fix_styles, of->fix_styles(), of->fix_map)
 JAMSHAPE_EITHER(compute_styles, of->compute_styles(), of->compute_map)

@@ -10,7 +10,8 @@ Debian in the folder, the newest commit of this clone is checked out there, and 
 by `chroot`. A folder that is there already is used again: its Debian is upgraded, so that a release in the making is
 that of today, and only what has changed is installed and compiled. What
 runs has its own table of mounts and of processes, which go when it ends, in whatever way. Variables of the environment
-for proxies, pip and OpenBLAS are passed on. The folder stays; it can be removed with `rm -r`.
+for proxies, pip and OpenBLAS are passed on. The folder stays; it can be removed with `rm -r`. In the end a deck
+compresses rods through jamming there and, if this clone is set up, here, and the positions that both write are compared.
 """
 
 from __future__ import annotations
@@ -47,6 +48,10 @@ root=$1; shift
 chroot "$root" "$@"
 """
 
+DECK = ("-in", "inputs/compress_spherocylinder.in", "-log", "none", "-screen", "none")
+DECK += ("-var", "n", "64", "-var", "kappa", "2e-3", "-var", "phi_end", "0.86", "-var", "out")
+POSITIONS = "build/deck.dump"
+
 VERSIONS = (
     ("LAMMPS", "dpkg-query -W -f '${Version}' lammps"),
     ("Open MPI", "dpkg-query -W -f '${Version}' openmpi-bin"),
@@ -54,6 +59,9 @@ VERSIONS = (
     ("Python", "/usr/bin/python3 -c 'import platform; print(platform.python_version())'"),
     ("numpy", ".venv/bin/python -c 'import numpy; print(numpy.__version__)'"),
 )
+
+
+AS_ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
 
 
 class UnexpectedError(Exception):
@@ -202,6 +210,22 @@ def minutes(seconds):
     return f"{seconds // 60:.0f} min {seconds % 60:.0f} s"
 
 
+def compared_deck(root):
+    """Run the deck in both clones and tell whether the numbers of their dumps agree."""
+    if not (CLONE / ".venv").exists():
+        return "not run here, where ./run setup was not"
+    words = ("lmp", *DECK, POSITIONS.removesuffix(".dump"))
+    subprocess.run(inside(root, *words), env=environment() | AS_ROOT, check=True)
+    (CLONE / "build").mkdir(exist_ok=True)
+    subprocess.run(words, cwd=CLONE, env=os.environ | AS_ROOT, check=True)
+    # Some versions end lines with a blank; words that are no numbers are headings.
+    here, there = ((folder / POSITIONS).read_text().split() for folder in (CLONE, root / INSIDE))
+    if here == there:
+        return f"the same bits in {len(here)} words"
+    off = [abs(float(a) - float(b)) for a, b in zip(here, there, strict=True) if a != b]
+    return f"{len(off)} of {len(here)} numbers differ, by {max(off):.1e} at most"
+
+
 def set_up_and_test(root, options):
     """Do all of it, print what came of it, and return whether it went well."""
     began = time.monotonic()
@@ -221,6 +245,7 @@ def set_up_and_test(root, options):
     print(f"   debootstrap   {bootstrapped}")
     print(f"   ./run setup   {set_up}")
     print(f"   ./run test    {minutes(seconds)}: {last[-1].strip('= ') if last else 'nothing'}")
+    print(f"   deck          {compared_deck(root)}")
     require(code == 0, f"./run test ended with {code} in {root}, expected 0: see above")
 
 

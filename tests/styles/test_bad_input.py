@@ -287,7 +287,7 @@ def test_atom_style_must_be_ellipsoid():
         run 0""")
     assert sentence == (
         "pair_style spherocylinder/harmonic found atom_style sphere, expected ellipsoid: use "
-        "'atom_style ellipsoid' and give every atom a shape."
+        "'atom_style ellipsoid', behind 'suffix off' if an accelerator adds one, and give every atom a shape."
     )
 
 

@@ -18,6 +18,7 @@ from lammps_runs import (
 from lammps_scenes import dense
 from superellipsoid_scenes import particles
 
+from benchmarks.peer_contacts import compared, pairs_of
 from jamshape.files.lammps_text import write_data
 from jamshape.lammps.module import start_lammps
 from jamshape.shapes.shape import Interaction
@@ -174,3 +175,14 @@ def test_created_ellipsoids_have_the_inertia_of_their_mass(tmp_path):
     squares = (np.array([1.0, 1.2, 1.4]) / 2) ** 2
     expected = (squares.sum() - squares) / 5  # m (b^2 + c^2) / 5
     np.testing.assert_allclose(rows[:, :3] / rows[:, 3:], np.tile(expected, (20, 1)), rtol=1e-5)
+
+
+@pytest.mark.parametrize("exponents", [(2.0, 2.0), (3.0, 3.0), (8.0, 2.0)])
+def test_contacts_are_those_of_lammps(exponents, measured):
+    """If both bodies have the same exponents, in the same places and directions."""
+    found = compared(pairs_of(200, np.array(exponents), seed=2))
+    assert found["touching"] > 50
+    assert found["differ"] == 0
+    measured(angle=found["angle, largest"], arm=found["arm, largest"])
+    assert found["angle, largest"] < 1e-9
+    assert found["arm, largest"] < 1e-9
