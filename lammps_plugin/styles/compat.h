@@ -96,9 +96,9 @@ auto forward(Comm *comm, Fix *fix, int n) -> decltype(comm->forward_comm_fix(fix
 
 /// Defines a function of one of LAMMPS's objects, `of`, as the first of two expressions that this
 /// version compiles.
-#define JAMSHAPE_EITHER(name, newer, older)                                              \
-  template <class T> auto name(T *of, int) -> decltype((newer)) { return newer; }        \
-  template <class T> auto name(T *of, long) -> decltype((older)) { return older; }       \
+#define JAMSHAPE_EITHER(name, newer, older)                                                        \
+  template <class T> auto name(T *of, int) -> decltype((newer)) { return newer; }                  \
+  template <class T> auto name(T *of, long) -> decltype((older)) { return older; }                 \
   template <class T> decltype(auto) name(T *of) { return name(of, 0); }
 
 /// Number of regions defined by the deck: a public counter until 2022.
@@ -109,8 +109,7 @@ JAMSHAPE_EITHER(n_regions, of->get_region_list().size(), of->nregion)
 JAMSHAPE_EITHER(has_post_force, of->n_post_force_any != 0, of->n_post_force != 0)
 
 /// The fixes and computes of LAMMPS's Modify: public arrays until 2026.
-JAMSHAPE_EITHER(fixes, std::vector(of->get_fix_list()),
-                std::vector(of->fix, of->fix + of->nfix))
+JAMSHAPE_EITHER(fixes, std::vector(of->get_fix_list()), std::vector(of->fix, of->fix + of->nfix))
 JAMSHAPE_EITHER(computes, std::vector(of->get_compute_list()),
                 std::vector(of->compute, of->compute + of->ncompute))
 
@@ -139,7 +138,8 @@ auto add_style(Styles *styles, const char *name, Creator creator)
 
 /// Requests a half neighbour list of a pair style: by `request` until 2022.
 template <class Neighbor, class Pair>
-auto request_list(Neighbor *neighbor, Pair *pair, int) -> decltype(void(neighbor->add_request(pair)))
+auto request_list(Neighbor *neighbor, Pair *pair, int)
+    -> decltype(void(neighbor->add_request(pair)))
 {
   neighbor->add_request(pair);
 }

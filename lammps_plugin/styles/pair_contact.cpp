@@ -314,9 +314,9 @@ void PairContact::require_exponents(int i) const
   refuse(lmp, FLERR,
          "pair_style " + style_name() + " found atom " + std::to_string(atom->tag[i]) +
              " with the exponents " + pair(*its) + ", expected " + pair(expected) +
-             " of its type " + std::to_string(type) +
-             ": give both the same, by 'set type " + std::to_string(type) + " block " +
-             pair(expected) + "' or by pair_coeff, or use 'atom_style ellipsoid' alone.");
+             " of its type " + std::to_string(type) + ": give both the same, by 'set type " +
+             std::to_string(type) + " block " + pair(expected) +
+             "' or by pair_coeff, or use 'atom_style ellipsoid' alone.");
 }
 
 /// Shapes are read at the start of a run, numbers of types with them.

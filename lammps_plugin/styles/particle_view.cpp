@@ -42,11 +42,11 @@ void ParticleView::find_ellipsoids(const std::string &style)
     const int size = ellipsoids->pack_border_bonus(1, &i, packed);
     const Quaternion q = orientation(i), found = quaternion(packed + 4);
     const bool is_placed = found.w == q.w && found.i == q.i && found.j == q.j && found.k == q.k;
-    if (is_placed && (size == PER_SHAPE || size == PER_SUPERELLIPSOID)) return;
+    if (is_placed && (size == PER_SHAPE || size == PER_SHAPE_WITH_EXPONENTS)) return;
     refuse(lmp, FLERR,
            style + " found " + std::to_string(size) +
                " numbers with the shape of an atom, expected " + std::to_string(PER_SHAPE) +
-               " or, of a superellipsoid, " + std::to_string(PER_SUPERELLIPSOID) +
+               " or, with exponents, " + std::to_string(PER_SHAPE_WITH_EXPONENTS) +
                ", with its orientation behind the diameters: use LAMMPS " +
                std::to_string(JAMSHAPE_NEWEST_TESTED) + " or an older one.");
   }
@@ -63,7 +63,7 @@ Vec<3> ParticleView::semi_axes(int i) const
 std::optional<std::array<double, 2>> ParticleView::exponents(int i) const
 {
   double packed[MOST_PER_SHAPE];
-  if (ellipsoids->pack_border_bonus(1, &i, packed) != PER_SUPERELLIPSOID) return std::nullopt;
+  if (ellipsoids->pack_border_bonus(1, &i, packed) != PER_SHAPE_WITH_EXPONENTS) return std::nullopt;
   return std::array<double, 2>{packed[PER_SHAPE], packed[PER_SHAPE + 1]};
 }
 

@@ -66,10 +66,10 @@ template <class Add> void for_all_styles(const Add &add)
 }
 
 /// LAMMPS's names of what creators make.
-const char *kind_of(LAMMPS_NS::Pair *(*) (LAMMPS *) ) { return "pair"; }
-const char *kind_of(LAMMPS_NS::Fix *(*) (LAMMPS *, int, char **) ) { return "fix"; }
-const char *kind_of(LAMMPS_NS::Compute *(*) (LAMMPS *, int, char **) ) { return "compute"; }
-const char *kind_of(LAMMPS_NS::Command *(*) (LAMMPS *) ) { return "command"; }
+const char *kind_of(LAMMPS_NS::Pair *(*)(LAMMPS *) ) { return "pair"; }
+const char *kind_of(LAMMPS_NS::Fix *(*)(LAMMPS *, int, char **) ) { return "fix"; }
+const char *kind_of(LAMMPS_NS::Compute *(*)(LAMMPS *, int, char **) ) { return "compute"; }
+const char *kind_of(LAMMPS_NS::Command *(*)(LAMMPS *) ) { return "command"; }
 
 /// Adds styles to those of LAMMPS.
 struct AddToStyles {
@@ -150,14 +150,10 @@ std::string what_is_misread(void *handle)
     const char *name;
     int read;
   } numbers[] = {
-      {"tagint", sizeof(LAMMPS_NS::tagint)},
-      {"imageint", sizeof(LAMMPS_NS::imageint)},
-      {"bigint", sizeof(LAMMPS_NS::bigint)},
-      {"dimension", lmp->domain->dimension},
-      {"triclinic", lmp->domain->triclinic},
-      {"newton_pair", lmp->force->newton_pair},
-      {"nlocal", lmp->atom->nlocal},
-      {"ntypes", lmp->atom->ntypes},
+      {"tagint", sizeof(LAMMPS_NS::tagint)}, {"imageint", sizeof(LAMMPS_NS::imageint)},
+      {"bigint", sizeof(LAMMPS_NS::bigint)}, {"dimension", lmp->domain->dimension},
+      {"triclinic", lmp->domain->triclinic}, {"newton_pair", lmp->force->newton_pair},
+      {"nlocal", lmp->atom->nlocal},         {"ntypes", lmp->atom->ntypes},
   };
   for (const auto &[name, read] : numbers) {
     const int told = lammps_extract_setting(handle, name);
@@ -217,7 +213,8 @@ template <class Add> void add_styles(LAMMPS *lmp, const Add &add)
     if (lammps_has_style(lmp, kind.c_str(), name)) return;
     lmp->error->all(FLERR, "jamshape added the " + kind + " style " + name +
                                " to LAMMPS, which does not list it, expected a LAMMPS that does: "
-                               "use version " + tested + " or an older one.");
+                               "use version " +
+                               tested + " or an older one.");
   });
   tell_plugin_file(lmp);
   if (jamshape_built_for <= jamshape_newest_tested || lmp->comm->me != 0) return;

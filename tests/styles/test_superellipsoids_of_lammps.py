@@ -18,6 +18,7 @@ from lammps_runs import (
 from lammps_scenes import dense
 from superellipsoid_scenes import particles
 
+import jamshape as js
 from benchmarks.peer_contacts import compared, pairs_of
 from jamshape.files.lammps_text import write_data
 from jamshape.lammps.module import start_lammps
@@ -122,6 +123,24 @@ def test_two_exponents_have_the_same_forces_with_the_word(tmp_path):
     plain = forces_of(start(two, tmp_path / "plain.data", ""))
     with_word = start(two, tmp_path / "blocks.data", "superellipsoid")
     assert_same_bits(plain, forces_of(with_word))
+
+
+@pytest.mark.parametrize("exponent", [(1.0, 2.0, 1.5), None], ids=["p", "n1 and n2"])
+def test_data_files_written_by_lammps_are_read(exponent, tmp_path):
+    packing = bodies(3, exponent or 1.5)
+    if exponent is None:
+        packing = packing.with_(exponent=None, form=np.tile([4.0, 2.5], (packing.n, 1)))
+    with Session() as session:
+        session.commands(start(packing, tmp_path / "ours.data", "superellipsoid"))
+        session.commands(f"run 0\nwrite_data {tmp_path / 'theirs.data'}")
+    ours, theirs = (
+        js.load(tmp_path / f"{name}.data").sorted_by_id() for name in ("ours", "theirs")
+    )
+    assert theirs.shape_style == "superellipsoid"
+    np.testing.assert_array_equal(theirs.form, ours.form)
+    np.testing.assert_allclose(theirs.diameters, ours.diameters, rtol=1e-15)
+    moved = (theirs.position - ours.position) / ours.box.edges
+    np.testing.assert_allclose(moved, moved.round(), atol=1e-14)  # but for images
 
 
 def test_exponents_that_differ_from_those_of_the_type_are_refused(tmp_path):
