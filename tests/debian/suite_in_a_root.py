@@ -210,6 +210,16 @@ def minutes(seconds):
     return f"{seconds // 60:.0f} min {seconds % 60:.0f} s"
 
 
+def difference(one, other):
+    """Tell by how much the numbers of two dumps differ."""
+    # Some versions end lines with a blank; words that are no numbers are headings.
+    here, there = (path.read_text().split() for path in (one, other))
+    if here == there:
+        return f"the same bits in {len(here)} words"
+    off = [abs(float(a) - float(b)) for a, b in zip(here, there, strict=True) if a != b]
+    return f"{len(off)} of {len(here)} numbers differ, by {max(off):.1e} at most"
+
+
 def compared_deck(root):
     """Run the deck in both clones and tell whether the numbers of their dumps agree."""
     if not (CLONE / ".venv").exists():
@@ -218,12 +228,7 @@ def compared_deck(root):
     subprocess.run(inside(root, *words), env=environment() | AS_ROOT, check=True)
     (CLONE / "build").mkdir(exist_ok=True)
     subprocess.run(words, cwd=CLONE, env=os.environ | AS_ROOT, check=True)
-    # Some versions end lines with a blank; words that are no numbers are headings.
-    here, there = ((folder / POSITIONS).read_text().split() for folder in (CLONE, root / INSIDE))
-    if here == there:
-        return f"the same bits in {len(here)} words"
-    off = [abs(float(a) - float(b)) for a, b in zip(here, there, strict=True) if a != b]
-    return f"{len(off)} of {len(here)} numbers differ, by {max(off):.1e} at most"
+    return difference(CLONE / POSITIONS, root / INSIDE / POSITIONS)
 
 
 def set_up_and_test(root, options):

