@@ -19,6 +19,7 @@ import shutil
 import subprocess
 import sys
 import time
+import tomllib
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from pathlib import Path
 
@@ -97,9 +98,10 @@ def make_environment(source, folder):
         link.symlink_to(target)
     pip = (python, "-m", "pip", "install", "-q")
     run(*pip, "--upgrade", "pip>=25.1")
-    run(*pip, "--group", f"{CLONE}/pyproject.toml:test")
-    built = f"--config-settings=build-dir={folder}/jamshape"
-    run(*pip, built, CLONE, env=os.environ | {"JAMSHAPE_LAMMPS": str(installed)})
+    asked = tomllib.loads((CLONE / "pyproject.toml").read_text(encoding="utf-8"))
+    run(*pip, *asked["build-system"]["requires"], "--group", f"{CLONE}/pyproject.toml:test")
+    built = ("--no-build-isolation", f"--config-settings=build-dir={folder}/jamshape")
+    run(*pip, *built, CLONE, env=os.environ | {"JAMSHAPE_LAMMPS": str(installed)})
     return environment
 
 

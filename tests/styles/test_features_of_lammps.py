@@ -9,6 +9,7 @@ import sys
 import numpy as np
 import pytest
 from lammps_runs import (
+    QUIET,
     REPOSITORY,
     SHOW,
     Session,
@@ -18,6 +19,7 @@ from lammps_runs import (
     load_plugin,
     loaded,
     run_lmp_well,
+    start_lmp,
     state_of,
 )
 from lammps_scenes import dense, dense_mixture
@@ -210,3 +212,27 @@ def test_as_many_numbers_as_lammps_packs_with_a_shape_find_room(numbers, tmp_pat
     )  # fmt: skip
     exponents = "6 4" if numbers == 13 else "0 0"
     assert done.stdout == f"2.5 0.5 0.5 {exponents} 1\n", done.stderr[-2000:]
+
+
+@pytest.mark.parametrize("suffix", ["omp", "opt"])
+def test_the_suffix_of_an_accelerator_changes_no_bit(suffix, tmp_path):
+    found = []
+    for name, words in (("plain", ()), ("suffix", ("-sf", suffix))):
+        (tmp_path / "own.in").write_text(f"""{load_plugin()}
+            dimension 2
+            atom_style ellipsoid
+            create_random spherocylinder 64 0.4 1 type 1 5 1 1
+            pair_style spherocylinder/harmonic sides two
+            pair_coeff * * 1.0
+            fix squeeze all overdamped/affine drag 1.0 compress 1e-2
+            timestep 0.1
+            dump own all custom 600 {name}.dump id x y fx fy tqz
+            dump_modify own sort id format float %.17g
+            run 600""")
+        done = start_lmp(*QUIET, *words, "-in", "own.in", cwd=tmp_path)
+        if "package installed" in done.stdout:
+            pytest.skip(f"this LAMMPS has no package for the suffix {suffix}")
+        assert done.returncode == 0, done.stdout[-3000:]
+        found.append((tmp_path / f"{name}.dump").read_text())
+    assert found[0] == found[1]
+    assert len(found[0].splitlines()) == 2 * (9 + 64)
