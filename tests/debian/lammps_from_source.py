@@ -105,6 +105,12 @@ def make_environment(source, folder):
     return environment
 
 
+def package_of(environment):
+    """Return the folder of the installed jamshape, with its plugin and decks."""
+    [package] = environment.glob("lib/python3*/site-packages/jamshape")
+    return package
+
+
 def test(environment, words):
     """Run the tests with this LAMMPS."""
     more = {
@@ -113,6 +119,7 @@ def test(environment, words):
         "OMP_NUM_THREADS": "1",
         "OPENBLAS_NUM_THREADS": "1",
         "VIRTUAL_ENV": str(environment),
+        "JAMSHAPE_PLUGIN": str(package_of(environment) / "jamshape_plugin.so"),
         "PATH": f"{environment}/bin:{os.environ['PATH']}",
     }
     words = (environment / "bin" / "python", "-m", "pytest", *(words or TESTS))
@@ -123,9 +130,11 @@ def compared_deck(environment, folder):
     """Run the deck with this LAMMPS and with that of the clone, and tell whether the numbers of their dumps agree."""
     if not (CLONE / ".venv").exists():
         return "not run in the clone, where ./run setup was not"
-    [package] = environment.glob("lib/python3*/site-packages/jamshape")
     there, here = folder / "there.dump", folder / "here.dump"
-    for lmp, of, path in ((environment / "bin" / "lmp", package, there), ("lmp", CLONE, here)):
+    for lmp, of, path in (
+        (environment / "bin" / "lmp", package_of(environment), there),
+        ("lmp", CLONE, here),
+    ):
         words = (*DECK, path.with_suffix(""), "-var", "jamshape", of)
         run(lmp, *words, cwd=CLONE, env=os.environ | AS_ROOT)
     return difference(here, there)

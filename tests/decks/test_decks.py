@@ -12,7 +12,14 @@ import numpy as np
 import pytest
 from deck_runs import INPUTS, LEFT, SMALL, run_deck, start_deck, thermo, words_of
 from dumps import read_dump
-from lammps_runs import QUIET, REPOSITORY, bare_environment, complaints_of, start_lmp
+from lammps_runs import (
+    OF_DEBIAN_12,
+    QUIET,
+    REPOSITORY,
+    bare_environment,
+    complaints_of,
+    start_lmp,
+)
 
 from jamshape.contacts import forces
 from jamshape.contacts import network as contacts
@@ -330,7 +337,6 @@ def own_deck(folder, lines, ranks=1, **more):
     return found
 
 
-OF_DEBIAN_12 = 20210929
 READ_BY_ALL = ["plain", "a b", 'a "q"', "[*]#&;`touch X`"]
 READ_ONCE = ["$(touch X)${HOME}$n", "it's"]
 
