@@ -101,7 +101,7 @@ def make_environment(source, folder):
     asked = tomllib.loads((CLONE / "pyproject.toml").read_text(encoding="utf-8"))
     run(*pip, *asked["build-system"]["requires"], "--group", f"{CLONE}/pyproject.toml:test")
     built = ("--no-build-isolation", f"--config-settings=build-dir={folder}/jamshape")
-    run(*pip, *built, CLONE, env=os.environ | {"JAMSHAPE_LAMMPS": str(installed)})
+    run(*pip, *built, "--editable", CLONE, env=os.environ | {"JAMSHAPE_LAMMPS": str(installed)})
     return environment
 
 
