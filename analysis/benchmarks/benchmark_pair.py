@@ -8,7 +8,8 @@
 Rods: ours-one, ours-two: spherocylinder/harmonic; polygon: body/rounded/polygon with the same centres,
 angles, spines and radii; wca: lj/cut discs with sigma = R_i + R_j at the same N and phi.
 Dimers: ours and wca. Superellipsoids: ours; gayberne and resquared with the same centres, orientations and axes, and a cutoff
-of the longest diameter, so that no contact is out of reach.
+of the longest diameter, so that no contact is out of reach; granular, if it is named, with the same exponents as well:
+granular/superellipsoid, for which LAMMPS must be of 30Mar2026 or newer, without friction and damping.
 
   force   `run M` without integrator: each step is one force evaluation on a kept neighbour list;
           a contact that is sought by iteration is found where it was
@@ -154,10 +155,11 @@ def parser() -> ArgumentParser:
     """Make the parser of the command line."""
     found = parser_of(__doc__)
     add, work = found.add_argument, Path("runs/benchmark")
-    styles = {name: None for bench in BENCHES.values() for name in bench.styles}
+    styles = {name: style for bench in BENCHES.values() for name, style in bench.styles.items()}
+    usual = [name for name, style in styles.items() if style.is_everywhere]
     add("--shape", choices=BENCHES, default=next(iter(BENCHES)), help="(%(default)s)")
     add("--quick", action="store_true", help="the first half of the cases, and one size")
-    add("--only", nargs="+", choices=styles, default=list(styles), help="styles (all)")
+    add("--only", nargs="+", choices=styles, default=usual, help="styles (all but granular)")
     add("--measure", nargs="+", choices=MEASURES, default=list(MEASURES), help="(all)")
     add("--phi", nargs="+", type=float, help="packing fractions (those of the shape's cases)")
     add("--n", nargs="+", type=int, help="particles (usual for the shape)")

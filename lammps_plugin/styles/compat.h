@@ -6,6 +6,8 @@
 
 #include "lammps.h"
 
+#include <vector>
+
 // The class of deck commands, whose header Debian 12 does not install.
 #if __has_include("command.h")
 #include "command.h"
@@ -24,6 +26,9 @@ class Command : protected Pointers {
 #ifndef JAMSHAPE_LAMMPS_VERSION
 #error "JAMSHAPE_LAMMPS_VERSION (such as 20210929) must be set by the build"
 #endif
+
+// The newest LAMMPS that the tests have run with.
+#define JAMSHAPE_NEWEST_TESTED 20260704
 
 namespace LAMMPS_NS {
 
@@ -64,7 +69,12 @@ class Irregular {
 
 }  // namespace LAMMPS_NS
 
-extern "C" int lammps_version(void *handle);
+/// Functions of LAMMPS's library that all versions have.
+extern "C" {
+int lammps_version(void *handle);
+int lammps_extract_setting(void *handle, const char *keyword);
+int lammps_has_style(void *handle, const char *category, const char *name);
+}
 
 namespace jamshape::compat {
 
@@ -84,28 +94,60 @@ auto forward(Comm *comm, Fix *fix, int n) -> decltype(comm->forward_comm_fix(fix
   comm->forward_comm_fix(fix, n);
 }
 
-/// Whether any fix changes forces: the count was public until 2021; later there is a flag beside
-/// it.
-template <class Modify>
-auto has_post_force(const Modify *modify) -> decltype(modify->n_post_force_any != 0)
-{
-  return modify->n_post_force_any != 0;
-}
-template <class Modify>
-auto has_post_force(const Modify *modify) -> decltype(modify->n_post_force != 0)
-{
-  return modify->n_post_force != 0;
-}
+/// Defines a function of one of LAMMPS's objects, `of`, as the first of two expressions that this
+/// version compiles.
+#define JAMSHAPE_EITHER(name, newer, older)                                                        \
+  template <class T> auto name(T *of, int) -> decltype((newer)) { return newer; }                  \
+  template <class T> auto name(T *of, long) -> decltype((older)) { return older; }                 \
+  template <class T> decltype(auto) name(T *of) { return name(of, 0); }
 
 /// Number of regions defined by the deck: a public counter until 2022.
-template <class Domain> auto n_regions(Domain *domain) -> decltype(int(domain->nregion))
+JAMSHAPE_EITHER(n_regions, of->get_region_list().size(), of->nregion)
+
+/// Whether any fix changes forces: the count was public until 2021; later there is a flag beside
+/// it.
+JAMSHAPE_EITHER(has_post_force, of->n_post_force_any != 0, of->n_post_force != 0)
+
+/// The fixes and computes of LAMMPS's Modify: public arrays until 2026.
+JAMSHAPE_EITHER(fixes, std::vector(of->get_fix_list()), std::vector(of->fix, of->fix + of->nfix))
+JAMSHAPE_EITHER(computes, std::vector(of->get_compute_list()),
+                std::vector(of->compute, of->compute + of->ncompute))
+
+/// The creators of styles by name: a registry of the process since the summer of 2026, before then
+/// a table of each instance.
+JAMSHAPE_EITHER(pair_styles, of->pair_styles(), of->pair_map)
+JAMSHAPE_EITHER(fix_styles, of->fix_styles(), of->fix_map)
+JAMSHAPE_EITHER(compute_styles, of->compute_styles(), of->compute_map)
+JAMSHAPE_EITHER(command_styles, of->command_styles(), of->command_map)
+
+#undef JAMSHAPE_EITHER
+
+/// Adds a style to one of them, in place of an earlier one of its name.
+template <class Styles, class Creator>
+auto add_style(Styles &styles, const char *name, Creator creator)
+    -> decltype(styles.set_plugin(name, creator))
 {
-  return domain->nregion;
+  styles.set_plugin(name, creator);
 }
-template <class Domain>
-auto n_regions(Domain *domain) -> decltype(int(domain->get_region_list().size()))
+template <class Styles, class Creator>
+auto add_style(Styles *styles, const char *name, Creator creator)
+    -> decltype(void((*styles)[name] = creator))
 {
-  return static_cast<int>(domain->get_region_list().size());
+  (*styles)[name] = creator;
+}
+
+/// Requests a half neighbour list of a pair style: by `request` until 2022.
+template <class Neighbor, class Pair>
+auto request_list(Neighbor *neighbor, Pair *pair, int)
+    -> decltype(void(neighbor->add_request(pair)))
+{
+  neighbor->add_request(pair);
+}
+template <class Neighbor, class Pair>
+auto request_list(Neighbor *neighbor, Pair *pair, long instance)
+    -> decltype(void(neighbor->request(pair, instance)))
+{
+  neighbor->request(pair, static_cast<int>(instance));
 }
 
 }  // namespace jamshape::compat

@@ -268,12 +268,12 @@ void FixOverdampedAffine::make_control(const Command &of)
 
 void FixOverdampedAffine::need_virial(bigint step)
 {
-  const int which = modify->find_compute(std::string(id) + "_stress");
-  if (which < 0) {
-    flow->stop("found no compute " + std::string(id) +
-               "_stress, expected the one that the fix made: leave out its 'uncompute'.");
+  const std::string name = std::string(id) + "_stress";
+  for (LAMMPS_NS::Compute *const compute : compat::computes(modify)) {
+    if (compute->id == name) return compute->addstep(step);
   }
-  modify->compute[which]->addstep(step);
+  flow->stop("found no compute " + name +
+             ", expected the one that the fix made: leave out its 'uncompute'.");
 }
 
 /// Sets the rates of the box to those of the stress and the targets at LAMMPS's own forces.
@@ -341,16 +341,15 @@ void FixOverdampedAffine::require_alone() const
         "bonds, angles, dihedrals, impropers or a kspace_style, expected forces of contacts and of "
         "fixes alone: set these styles to none.");
   }
-  for (int k = 0; k < modify->nfix; ++k) {
-    const Fix &other = *modify->fix[k];
-    if (&other == this) continue;
-    const std::string named = "fix " + std::string(other.style) + " (" + other.id + ")";
-    const std::string cure = std::string(": use 'unfix ") + other.id + "'.";
-    if (other.time_integrate) {
+  for (const Fix *const other : compat::fixes(modify)) {
+    if (other == this) continue;
+    const std::string named = "fix " + std::string(other->style) + " (" + other->id + ")";
+    const std::string cure = std::string(": use 'unfix ") + other->id + "'.";
+    if (other->time_integrate) {
       fail(named + ", which also moves particles, expected only this fix to move them" + cure);
     }
     for (const char *const style : OF_VELOCITIES) {
-      if (!begins_with(other.style, style)) continue;
+      if (!begins_with(other->style, style)) continue;
       fail(named +
            ", which acts on velocities, expected none: the motion has no inertia and no "
            "temperature" +

@@ -439,7 +439,7 @@ void OverdampedFlow::clear_forces()
 /// Like LAMMPS's own step: exchanges atoms, ghosts and lists.
 void OverdampedFlow::rebuild_lists()
 {
-  if (modify->n_pre_exchange) modify->pre_exchange();
+  modify->pre_exchange();
   if (domain->triclinic) domain->x2lamda(atom->nlocal);
   domain->pbc();
   if (domain->box_change) {
@@ -450,9 +450,9 @@ void OverdampedFlow::rebuild_lists()
   comm->exchange();
   comm->borders();
   if (domain->triclinic) domain->lamda2x(atom->nlocal + atom->nghost);
-  if (modify->n_pre_neighbor) modify->pre_neighbor();
+  modify->pre_neighbor();
   neighbor->build(1);
-  if (modify->n_post_neighbor) modify->post_neighbor();
+  modify->post_neighbor();
   ++rebuilds;
 }
 
@@ -466,11 +466,11 @@ void OverdampedFlow::evaluate_forces()
   }
   clear_forces();
   const int no_energy = 0, virial = control_of_box ? VIRIAL_OF_PAIRS : 0, no_virial = 0;
-  if (modify->n_pre_force) modify->pre_force(no_virial);
+  modify->pre_force(no_virial);
   force->pair->compute(no_energy, virial);
   if (force->newton) comm->reverse_comm();
   if (control_of_box) control_of_box->follow();
-  if (compat::has_post_force(modify)) modify->post_force(no_virial);
+  modify->post_force(no_virial);
   ++evaluations;
 }
 

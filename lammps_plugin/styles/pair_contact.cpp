@@ -301,13 +301,31 @@ void PairContact::stop_at_shape(const Vec<3> &semi_axes, const std::string &whic
              shown(diameters[2]) + ", expected that " + shape_rule() + ": correct its shape.");
 }
 
+/// Under 'atom_style ellipsoid superellipsoid' each atom has exponents as well, of which n1 does
+/// not count in 2D.
+void PairContact::require_exponents(int i) const
+{
+  const auto its = particles.exponents(i);
+  if (!its) return;
+  const int type = atom->type[i];
+  const std::array<double, 2> expected = exponents(type);
+  if ((*its)[1] == expected[1] && (domain->dimension == 2 || (*its)[0] == expected[0])) return;
+  const auto pair = [](const std::array<double, 2> &n) { return shown(n[0]) + " " + shown(n[1]); };
+  refuse(lmp, FLERR,
+         "pair_style " + style_name() + " found atom " + std::to_string(atom->tag[i]) +
+             " with the exponents " + pair(*its) + ", expected " + pair(expected) +
+             " of its type " + std::to_string(type) + ": give both the same, by 'set type " +
+             std::to_string(type) + " block " + pair(expected) +
+             "' or by pair_coeff, or use 'atom_style ellipsoid' alone.");
+}
+
 /// Shapes are read at the start of a run, numbers of types with them.
 void PairContact::require_lasting_types() const
 {
   const bool is_mixture =
       std::any_of(form_of.begin() + 1, form_of.end(), [&](const auto &f) { return f != form(1); });
-  for (int k = 0; is_mixture && k < modify->nfix; ++k) {
-    if (std::string(modify->fix[k]->style) != "atom/swap") continue;
+  for (const LAMMPS_NS::Fix *const fix : compat::fixes(modify)) {
+    if (!is_mixture || std::string(fix->style) != "atom/swap") continue;
     error->all(FLERR, "pair_style " + style_name() +
                           " found fix atom/swap, which changes types between evaluations, "
                           "expected the same " +
@@ -329,6 +347,7 @@ void PairContact::measure_particles()
     const Vec<3> semi_axes = particles.semi_axes(i);
     if (handles(i)) {
       require_shape(i, semi_axes);
+      require_exponents(i);
     } else if (!is_valid_shape(semi_axes, type)) {
       continue;
     }
@@ -363,7 +382,7 @@ void PairContact::init_style()
   measure_particles();
   require_orientations_of_rerun();
   if (update->whichflag == 2) require_held_in_minimisation();
-  neighbor->request(this, instance_me);
+  compat::request_list(neighbor, this, instance_me);
   if (update->whichflag == 2 && any_turns) request_minimiser();
 }
 
@@ -393,14 +412,13 @@ void PairContact::require_orientations_of_rerun() const
 /// Rejects fixes that hold particles in dynamics but that LAMMPS ignores in a minimisation.
 void PairContact::require_held_in_minimisation() const
 {
-  for (int k = 0; k < modify->nfix; ++k) {
-    const LAMMPS_NS::Fix &fix = *modify->fix[k];
-    const bool holds = begins_with(fix.style, "freeze") || begins_with(fix.style, "rigid");
-    if (!holds || modify->fmask[k] & LAMMPS_NS::FixConst::MIN_POST_FORCE) continue;
-    error->all(FLERR, std::string("minimize found fix ") + fix.id + " of style " + fix.style +
+  for (LAMMPS_NS::Fix *const fix : compat::fixes(modify)) {
+    const bool holds = begins_with(fix->style, "freeze") || begins_with(fix->style, "rigid");
+    if (!holds || fix->setmask() & LAMMPS_NS::FixConst::MIN_POST_FORCE) continue;
+    error->all(FLERR, std::string("minimize found fix ") + fix->id + " of style " + fix->style +
                           ", which LAMMPS ignores in minimisations: hold its particles with 'fix "
                           "ID group setforce 0 0 0' and use 'unfix " +
-                          fix.id + "'.");
+                          fix->id + "'.");
   }
 }
 
@@ -866,13 +884,12 @@ void PairContact::find_held()
   for (int i = 0; i < nlocal; ++i) is_held[i] = !handles(i);
   std::vector<double> kept;
   double **const f = atom->f, *const all = nlocal > 0 ? f[0] : nullptr;
-  for (int k = 0; k < modify->nfix; ++k) {
-    LAMMPS_NS::Fix &fix = *modify->fix[k];
-    const bool acts = modify->fmask[k] & LAMMPS_NS::FixConst::MIN_POST_FORCE;
-    if (!acts || !begins_with(fix.style, "setforce")) continue;
+  for (LAMMPS_NS::Fix *const fix : compat::fixes(modify)) {
+    if (!begins_with(fix->style, "setforce")) continue;
+    if (!(fix->setmask() & LAMMPS_NS::FixConst::MIN_POST_FORCE)) continue;
     kept.assign(all, all + 3 * nlocal);
     std::fill_n(all, 3 * nlocal, 1.0);
-    fix.min_post_force(0);  // on all ranks: it may evaluate variables
+    fix->min_post_force(0);  // on all ranks: it may evaluate variables
     for (int i = 0; i < nlocal; ++i) {
       is_held[i] |= std::all_of(f[i], f[i] + d, [](double component) { return component == 0.0; });
     }

@@ -9,6 +9,7 @@
 #include "pair.h"
 #include "particle_view.h"
 
+#include <array>
 #include <cstddef>
 #include <functional>
 #include <map>
@@ -149,6 +150,8 @@ class PairContact : public LAMMPS_NS::Pair {
   virtual bool take_form(int type, const FormNumbers &numbers) = 0;
   /// Name of these numbers, empty for shapes without, and a description of the required ones.
   virtual std::string form_name() const = 0;
+  /// The exponents n1 and n2 of a type, which an atom may have as well.
+  virtual std::array<double, 2> exponents(int) const { return {2.0, 2.0}; }
   virtual std::string form_rule() const = 0;
 
   /// Checks one shape and returns a description of the required one.
@@ -167,6 +170,7 @@ class PairContact : public LAMMPS_NS::Pair {
   void require_shape(int i, const Vec<3> &semi_axes) const;
   [[noreturn]] void stop_at_shape(const Vec<3> &semi_axes, const std::string &which) const;
   void require_same_bound(int i, const Vec<3> &semi_axes) const;
+  void require_exponents(int i) const;
   [[noreturn]] void stop_at_unexpected_turns(int i) const;
   /// Whether special_bonds keeps the pair (i, j) of LAMMPS's list in the sum.
   bool has_full_weight(int i, int listed) const

@@ -1,7 +1,9 @@
 #include "contact/superellipsoid/superellipsoid.hpp"
 
+#include "domain.h"
 #include "pair_contact_of.h"
 
+#include <array>
 #include <string>
 
 namespace jamshape {
@@ -22,6 +24,11 @@ class PairSuperellipsoidHarmonic : public PairContactOf<SuperellipsoidModel> {
   }
   std::string energy_name() const override { return "epsilon"; }
   std::string without_force() const override { return "coinciding centres"; }
+  std::array<double, 2> exponents(int type) const override
+  {
+    const auto its = SuperellipsoidForm::from(form(type), domain->dimension);
+    return {2.0 * its->p, 2.0 * its->p_across};
+  }
 };
 
 const PairStyle<PairSuperellipsoidHarmonic> listed;

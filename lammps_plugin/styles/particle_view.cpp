@@ -33,18 +33,22 @@ void ParticleView::find_ellipsoids(const std::string &style)
   if (!ellipsoids) {
     error->all(FLERR,
                style + " found atom_style " + atom->atom_style +
-                   ", expected ellipsoid: use 'atom_style ellipsoid' and give every atom a shape.");
+                   ", expected ellipsoid: use 'atom_style ellipsoid', behind 'suffix off' if an "
+                   "accelerator adds one, and give every atom a shape.");
   }
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!has_shape(i)) continue;
     double packed[MOST_PER_SHAPE];
     const int size = ellipsoids->pack_border_bonus(1, &i, packed);
-    if (size == PER_SHAPE) return;
+    const Quaternion q = orientation(i), found = quaternion(packed + 4);
+    const bool is_placed = found.w == q.w && found.i == q.i && found.j == q.j && found.k == q.k;
+    if (is_placed && (size == PER_SHAPE || size == PER_SHAPE_WITH_EXPONENTS)) return;
     refuse(lmp, FLERR,
            style + " found " + std::to_string(size) +
                " numbers with the shape of an atom, expected " + std::to_string(PER_SHAPE) +
-               ": write 'atom_style ellipsoid' without further arguments, and give exponents with "
-               "'pair_coeff I I epsilon p'.");
+               " or, with exponents, " + std::to_string(PER_SHAPE_WITH_EXPONENTS) +
+               ", with its orientation behind the diameters: use LAMMPS " +
+               std::to_string(JAMSHAPE_NEWEST_TESTED) + " or an older one.");
   }
 }
 
@@ -54,6 +58,13 @@ Vec<3> ParticleView::semi_axes(int i) const
   packed[1] = packed[2] = packed[3] = 0.0;
   ellipsoids->pack_border_bonus(1, &i, packed);
   return {{packed[1], packed[2], packed[3]}};
+}
+
+std::optional<std::array<double, 2>> ParticleView::exponents(int i) const
+{
+  double packed[MOST_PER_SHAPE];
+  if (ellipsoids->pack_border_bonus(1, &i, packed) != PER_SHAPE_WITH_EXPONENTS) return std::nullopt;
+  return std::array<double, 2>{packed[PER_SHAPE], packed[PER_SHAPE + 1]};
 }
 
 Quaternion ParticleView::orientation(int i) const
@@ -72,8 +83,8 @@ void ParticleView::set_orientation(int i, const Quaternion &q) const
 void ParticleView::set_diameters(int i, const Vec<3> &diameters) const
 {
   const Vec<3> a = 0.5 * diameters;
-  ellipsoids->set_shape(i, a[0], a[1], a[2]);
   atom->rmass[i] = 4.0 / 3.0 * M_PI * a[0] * a[1] * a[2];
+  ellipsoids->set_shape(i, a[0], a[1], a[2]);  // with the moments of inertia of this mass
 }
 
 }  // namespace jamshape

@@ -8,8 +8,10 @@
 #include "pointers.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,6 +38,9 @@ class ParticleView : protected LAMMPS_NS::Pointers {
   bool has_shape(int i) const { return atom->ellipsoid[i] >= 0; }
   /// Zeros for an atom without a shape.
   Vec<3> semi_axes(int i) const;
+  /// The exponents n1 and n2 of an atom with a shape, if the atom style has them: since LAMMPS
+  /// 30Mar2026 one does.
+  std::optional<std::array<double, 2>> exponents(int i) const;
   /// The identity for an atom without a shape.
   Quaternion orientation(int i) const;
   void set_orientation(int i, const Quaternion &q) const;
@@ -102,6 +107,7 @@ class ParticleView : protected LAMMPS_NS::Pointers {
 
  private:
   static constexpr int PER_ORIENTATION = 4, PER_SHAPE = 8;
+  static constexpr int PER_SHAPE_WITH_EXPONENTS = 13;  // and moments of inertia
   static constexpr int MOST_PER_SHAPE = 64;  // room for the data that versions keep beside a shape
 
   LAMMPS_NS::AtomVecEllipsoid *ellipsoids = nullptr;

@@ -1,18 +1,21 @@
 // The plugin's table of contents, one line per style other than pair styles, and its registration
 // in LAMMPS.
 
+#include "atom.h"
 #include "comm.h"
 #include "compat.h"
 #include "compute_contact_local.h"
 #include "compute_packing.h"
 #include "create_random.h"
 #include "decimal_point.h"
+#include "domain.h"
 #include "error.h"
 #include "fix_overdamped_affine.h"
 #include "force.h"
 #include "input.h"
 #include "modify.h"
 #include "pair_contact.h"
+#include "utils.h"
 #include "variable.h"
 
 #include <cstddef>
@@ -38,6 +41,7 @@
 namespace {
 
 using LAMMPS_NS::LAMMPS;
+namespace compat = jamshape::compat;
 
 template <class T> LAMMPS_NS::Fix *fix(LAMMPS *lmp, int narg, char **arg)
 {
@@ -51,7 +55,7 @@ template <class T> LAMMPS_NS::Compute *compute(LAMMPS *lmp, int narg, char **arg
 LAMMPS_NS::Command *command(LAMMPS *lmp) { return new jamshape::CreateRandom(lmp); }
 
 /// Passes each style to `add`, which distinguishes pairs, fixes, computes and commands.
-template <class Add> void for_all_styles(Add &&add)
+template <class Add> void for_all_styles(const Add &add)
 {
   using namespace jamshape;
   for (const auto &[name, creator] : pair_styles()) add(name.c_str(), creator);
@@ -61,25 +65,31 @@ template <class Add> void for_all_styles(Add &&add)
   add("create_random", command);
 }
 
-/// Adds styles to the tables of LAMMPS.
-struct AddToMaps {
+/// LAMMPS's names of what creators make.
+const char *kind_of(LAMMPS_NS::Pair *(*)(LAMMPS *) ) { return "pair"; }
+const char *kind_of(LAMMPS_NS::Fix *(*)(LAMMPS *, int, char **) ) { return "fix"; }
+const char *kind_of(LAMMPS_NS::Compute *(*)(LAMMPS *, int, char **) ) { return "compute"; }
+const char *kind_of(LAMMPS_NS::Command *(*)(LAMMPS *) ) { return "command"; }
+
+/// Adds styles to those of LAMMPS.
+struct AddToStyles {
   LAMMPS *lmp;
 
   void operator()(const char *name, LAMMPS_NS::Pair *(*creator)(LAMMPS *) ) const
   {
-    (*lmp->force->pair_map)[name] = creator;
+    compat::add_style(compat::pair_styles(lmp->force), name, creator);
   }
   void operator()(const char *name, LAMMPS_NS::Fix *(*creator)(LAMMPS *, int, char **) ) const
   {
-    (*lmp->modify->fix_map)[name] = creator;
+    compat::add_style(compat::fix_styles(lmp->modify), name, creator);
   }
   void operator()(const char *name, LAMMPS_NS::Compute *(*creator)(LAMMPS *, int, char **) ) const
   {
-    (*lmp->modify->compute_map)[name] = creator;
+    compat::add_style(compat::compute_styles(lmp->modify), name, creator);
   }
   void operator()(const char *name, LAMMPS_NS::Command *(*creator)(LAMMPS *) ) const
   {
-    (*lmp->input->command_map)[name] = creator;
+    compat::add_style(compat::command_styles(lmp->input), name, creator);
   }
 };
 
@@ -89,21 +99,18 @@ struct AddAsPlugins {
   void *handle;
   lammpsplugin_regfunc add;
 
-  void operator()(const char *name, LAMMPS_NS::Pair *(*creator)(LAMMPS *) ) const
+  template <class Style> void operator()(const char *name, Style *(*creator)(LAMMPS *) ) const
   {
-    add_without_arguments("pair", name, creator);
+    lammpsplugin_t one = named(kind_of(creator), name);
+    one.creator.v1 = reinterpret_cast<void *(*)(void *)>(creator);
+    add(&one, lmp);
   }
-  void operator()(const char *name, LAMMPS_NS::Command *(*creator)(LAMMPS *) ) const
+  template <class Style>
+  void operator()(const char *name, Style *(*creator)(LAMMPS *, int, char **) ) const
   {
-    add_without_arguments("command", name, creator);
-  }
-  void operator()(const char *name, LAMMPS_NS::Fix *(*creator)(LAMMPS *, int, char **) ) const
-  {
-    add_with_arguments("fix", name, creator);
-  }
-  void operator()(const char *name, LAMMPS_NS::Compute *(*creator)(LAMMPS *, int, char **) ) const
-  {
-    add_with_arguments("compute", name, creator);
+    lammpsplugin_t one = named(kind_of(creator), name);
+    one.creator.v2 = reinterpret_cast<void *(*)(void *, int, char **)>(creator);
+    add(&one, lmp);
   }
 
  private:
@@ -111,20 +118,6 @@ struct AddAsPlugins {
   {
     // The version has already been checked.
     return {lmp->version, kind, name, name, "jamshape", {}, handle};
-  }
-  template <class Creator>
-  void add_without_arguments(const char *kind, const char *name, Creator *creator) const
-  {
-    lammpsplugin_t one = named(kind, name);
-    one.creator.v1 = reinterpret_cast<void *(*)(void *)>(creator);
-    add(&one, lmp);
-  }
-  template <class Creator>
-  void add_with_arguments(const char *kind, const char *name, Creator *creator) const
-  {
-    lammpsplugin_t one = named(kind, name);
-    one.creator.v2 = reinterpret_cast<void *(*)(void *, int, char **)>(creator);
-    add(&one, lmp);
   }
 };
 
@@ -136,15 +129,42 @@ extern "C" {
 /// The LAMMPS version that this binary was compiled for, as an integer such as 20210929, and the
 /// MPI library. (Variables, so that a test can simulate another build.)
 int jamshape_built_for = JAMSHAPE_LAMMPS_VERSION;
+int jamshape_newest_tested = JAMSHAPE_NEWEST_TESTED;
 const char *jamshape_built_with = JAMSHAPE_MPI;
 
 /// The same as text in the file, readable without loading it into LAMMPS.
 extern const char jamshape_label[];
-const char jamshape_label[] = "jamshape plugin for LAMMPS " JAMSHAPE_TEXT(JAMSHAPE_LAMMPS_VERSION);
+const char jamshape_label[] = "jamshape plugin for LAMMPS " JAMSHAPE_TEXT(
+    JAMSHAPE_LAMMPS_VERSION) ", newest tested " JAMSHAPE_TEXT(JAMSHAPE_NEWEST_TESTED);
 }
 #pragma GCC visibility pop
 
 namespace {
+
+/// An error message if LAMMPS's own functions report other numbers than its objects, as the headers
+/// describe them: versions under development have one date for many layouts. Else empty.
+std::string what_is_misread(void *handle)
+{
+  const auto *const lmp = static_cast<LAMMPS *>(handle);
+  const struct {
+    const char *name;
+    int read;
+  } numbers[] = {
+      {"tagint", sizeof(LAMMPS_NS::tagint)}, {"imageint", sizeof(LAMMPS_NS::imageint)},
+      {"bigint", sizeof(LAMMPS_NS::bigint)}, {"dimension", lmp->domain->dimension},
+      {"triclinic", lmp->domain->triclinic}, {"newton_pair", lmp->force->newton_pair},
+      {"nlocal", lmp->atom->nlocal},         {"ntypes", lmp->atom->ntypes},
+  };
+  for (const auto &[name, read] : numbers) {
+    const int told = lammps_extract_setting(handle, name);
+    if (read == told) continue;
+    return "jamshape read " + std::to_string(read) + " as '" + name + "' of LAMMPS " +
+           std::to_string(jamshape_built_for) + ", expected " + std::to_string(told) +
+           ": its headers are not those with which this plugin was built; build jamshape again "
+           "with this LAMMPS.";
+  }
+  return "";
+}
 
 /// An error message if this LAMMPS is not the one compiled for, whose objects have another layout,
 /// or uses another MPI library; else empty.
@@ -163,7 +183,7 @@ std::string what_differs(void *handle)
     return "jamshape found the MPI library " + library.substr(0, library.find_first_of(",\n\t")) +
            ", expected " + jamshape_built_with +
            " with which this plugin was built: build jamshape again with this LAMMPS.";
-  return "";
+  return what_is_misread(handle);
 }
 
 /// Sets the variable `jamshape_plugin` of decks, which exists only with the styles, to the file of
@@ -180,6 +200,27 @@ void tell_plugin_file(LAMMPS *lmp)
   LAMMPS_NS::Variable *const variables = lmp->input->variable;
   if (variables->find(name.data()) >= 0) variables->set(2, removal);
   variables->set(3, definition);
+}
+
+/// Adds the styles and checks that LAMMPS finds them. Tells if no tests have run with its version.
+template <class Add> void add_styles(LAMMPS *lmp, const Add &add)
+{
+  jamshape::give_decimal_point(lmp);
+  for_all_styles(add);
+  const std::string tested = std::to_string(jamshape_newest_tested);
+  for_all_styles([&](const char *name, auto *creator) {
+    const std::string kind = kind_of(creator);
+    if (lammps_has_style(lmp, kind.c_str(), name)) return;
+    lmp->error->all(FLERR, "jamshape added the " + kind + " style " + name +
+                               " to LAMMPS, which does not list it, expected a LAMMPS that does: "
+                               "use version " +
+                               tested + " or an older one.");
+  });
+  tell_plugin_file(lmp);
+  if (jamshape_built_for <= jamshape_newest_tested || lmp->comm->me != 0) return;
+  LAMMPS_NS::utils::logmesg(lmp, "jamshape was built for LAMMPS " +
+                                     std::to_string(jamshape_built_for) + ", newer than " + tested +
+                                     ", the newest of its tests: its checks at loading passed.\n");
 }
 
 }  // namespace
@@ -203,9 +244,7 @@ void jamshape_register(void *handle)
   auto *lmp = static_cast<LAMMPS *>(handle);
   const std::string wrong = what_differs(handle);
   if (!wrong.empty()) lmp->error->all(FLERR, wrong);
-  jamshape::give_decimal_point(lmp);
-  for_all_styles(AddToMaps{lmp});
-  tell_plugin_file(lmp);
+  add_styles(lmp, AddToStyles{lmp});
 }
 
 /// Entry point of `plugin load` and LAMMPS_PLUGIN_PATH. Another LAMMPS only gets a warning: one
@@ -218,9 +257,7 @@ void lammpsplugin_init(void *handle, void *library, void *add)
     if (lmp->comm->me == 0) lmp->error->warning(FLERR, wrong);
     return;
   }
-  jamshape::give_decimal_point(lmp);
-  for_all_styles(AddAsPlugins{lmp, library, reinterpret_cast<lammpsplugin_regfunc>(add)});
-  tell_plugin_file(lmp);
+  add_styles(lmp, AddAsPlugins{lmp, library, reinterpret_cast<lammpsplugin_regfunc>(add)});
 }
 
 /// Report of the work skipped for the present particles, as in the log; empty before the first

@@ -2,13 +2,16 @@
 
     python3 tests/debian/suite_in_a_root.py --root /var/tmp/trixie
     python3 tests/debian/suite_in_a_root.py --root /var/tmp/bookworm --release bookworm
+    python3 tests/debian/suite_in_a_root.py --root /var/tmp/forky --release forky
     python3 tests/debian/suite_in_a_root.py --root /var/tmp/trixie -- tests/styles -x
 
 As root, where `debootstrap`, `git` and `unshare` are; half an hour on two cores, and 4 GB. debootstrap makes a smallest
 Debian in the folder, the newest commit of this clone is checked out there, and `./run setup` and `./run test` run in it
-by `chroot`. A folder that is there already is used again: then only what has changed is installed and compiled. What
+by `chroot`. A folder that is there already is used again: its Debian is upgraded, so that a release in the making is
+that of today, and only what has changed is installed and compiled. What
 runs has its own table of mounts and of processes, which go when it ends, in whatever way. Variables of the environment
-for proxies, pip and OpenBLAS are passed on. The folder stays; it can be removed with `rm -r`.
+for proxies, pip and OpenBLAS are passed on. The folder stays; it can be removed with `rm -r`. In the end a deck
+compresses rods through jamming there and, if this clone is set up, here, and the positions that both write are compared.
 """
 
 from __future__ import annotations
@@ -27,7 +30,9 @@ from pathlib import Path
 CLONE = Path(__file__).resolve().parents[2]
 INSIDE = "root/jamshape"  # the clone in the folder
 CERTIFICATES = "root/certificates.pem"
-RELEASES = {"bookworm": "12", "trixie": "13"}
+RELEASES = {"bookworm": "12", "trixie": "13", "forky": "14"}
+SCRIPTS = Path("/usr/share/debootstrap/scripts")
+MIRROR = "http://deb.debian.org/debian"
 ADVICE = "see that there is a network, or name another mirror with --mirror"
 
 PASSED_ON = re.compile(
@@ -43,6 +48,10 @@ root=$1; shift
 chroot "$root" "$@"
 """
 
+DECK = ("-in", "inputs/compress_spherocylinder.in", "-log", "none", "-screen", "none")
+DECK += ("-var", "n", "64", "-var", "kappa", "2e-3", "-var", "phi_end", "0.86", "-var", "out")
+POSITIONS = "build/deck.dump"
+
 VERSIONS = (
     ("LAMMPS", "dpkg-query -W -f '${Version}' lammps"),
     ("Open MPI", "dpkg-query -W -f '${Version}' openmpi-bin"),
@@ -50,6 +59,9 @@ VERSIONS = (
     ("Python", "/usr/bin/python3 -c 'import platform; print(platform.python_version())'"),
     ("numpy", ".venv/bin/python -c 'import numpy; print(numpy.__version__)'"),
 )
+
+
+AS_ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
 
 
 class UnexpectedError(Exception):
@@ -92,9 +104,9 @@ def bootstrap(root, release, mirror):
     if root.is_dir() and any(root.iterdir()):
         require_release(root, release)
         return False
-    code, last = said_by(
-        "debootstrap", "--variant=minbase", release, root, *([mirror] if mirror else [])
-    )
+    # A release younger than this debootstrap is made as unstable is.
+    like = () if (SCRIPTS / release).exists() else (SCRIPTS / "sid",)
+    code, last = said_by("debootstrap", "--variant=minbase", release, root, mirror, *like)
     told = last[-1] if last else "no word"
     require(code == 0, f"debootstrap ended with '{told}', expected {release} in {root}: {ADVICE}")
     return True
@@ -114,6 +126,9 @@ def require_release(root, release):
 
 def take_network(root):
     """Let programs inside find hosts as they are found here, and trust whom is trusted here."""
+    # Mirrors that lag, and snapshots, of a release in the making are older than a week.
+    settings = root / "etc" / "apt" / "apt.conf.d" / "90jamshape"
+    settings.write_text('Acquire::Check-Valid-Until "false";\n')
     shutil.copyfile("/etc/resolv.conf", root / "etc" / "resolv.conf")
     named = [os.environ[name] for name in OF_CERTIFICATES if name in os.environ]
     if named:
@@ -136,6 +151,19 @@ def take_clone(root):
         [*git, "log", "-1", "--format=%h"], capture_output=True, text=True, check=True
     )
     return done.stdout.strip()
+
+
+def upgrade(root):
+    """Bring the packages of an earlier run to the state of today."""
+    for words in (("update", "-q"), ("dist-upgrade", "-qy", "--no-install-recommends")):
+        code, last = said_by(
+            *inside(root, "apt-get", *words),
+            env=environment() | {"DEBIAN_FRONTEND": "noninteractive"},
+        )
+        told = last[-1] if last else "no word"
+        require(
+            code == 0, f"apt-get {words[0]} ended with '{told}' in {root}, expected 0: {ADVICE}"
+        )
 
 
 # --- inside ---------------------------------------------------------------------------------------
@@ -182,6 +210,27 @@ def minutes(seconds):
     return f"{seconds // 60:.0f} min {seconds % 60:.0f} s"
 
 
+def difference(one, other):
+    """Tell by how much the numbers of two dumps differ."""
+    # Some versions end lines with a blank; words that are no numbers are headings.
+    here, there = (path.read_text().split() for path in (one, other))
+    if here == there:
+        return f"the same bits in {len(here)} words"
+    off = [abs(float(a) - float(b)) for a, b in zip(here, there, strict=True) if a != b]
+    return f"{len(off)} of {len(here)} numbers differ, by {max(off):.1e} at most"
+
+
+def compared_deck(root):
+    """Run the deck in both clones and tell whether the numbers of their dumps agree."""
+    if not (CLONE / ".venv").exists():
+        return "not run here, where ./run setup was not"
+    words = ("lmp", *DECK, POSITIONS.removesuffix(".dump"))
+    subprocess.run(inside(root, *words), env=environment() | AS_ROOT, check=True)
+    (CLONE / "build").mkdir(exist_ok=True)
+    subprocess.run(words, cwd=CLONE, env=os.environ | AS_ROOT, check=True)
+    return difference(CLONE / POSITIONS, root / INSIDE / POSITIONS)
+
+
 def set_up_and_test(root, options):
     """Do all of it, print what came of it, and return whether it went well."""
     began = time.monotonic()
@@ -189,6 +238,8 @@ def set_up_and_test(root, options):
     bootstrapped = minutes(time.monotonic() - began) if is_new else "was there"
     take_network(root)
     commit = take_clone(root)
+    if not is_new:
+        upgrade(root)
     code, _, seconds = run_there(root, "setup")
     require(code == 0, f"./run setup ended with {code} in {root}, expected 0: see above")
     set_up = minutes(seconds)
@@ -199,6 +250,7 @@ def set_up_and_test(root, options):
     print(f"   debootstrap   {bootstrapped}")
     print(f"   ./run setup   {set_up}")
     print(f"   ./run test    {minutes(seconds)}: {last[-1].strip('= ') if last else 'nothing'}")
+    print(f"   deck          {compared_deck(root)}")
     require(code == 0, f"./run test ended with {code} in {root}, expected 0: see above")
 
 
@@ -219,7 +271,7 @@ def main():
     parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
     parser.add_argument("--root", type=Path, required=True, help="folder, new or of an earlier run")
     parser.add_argument("--release", choices=RELEASES, default="trixie", help="(trixie)")
-    parser.add_argument("--mirror", metavar="URL", help="of Debian's packages (debootstrap's own)")
+    parser.add_argument("--mirror", metavar="URL", default=MIRROR, help=f"of packages ({MIRROR})")
     parser.add_argument("words", nargs="*", help="go to ./run test, behind --")
     options = parser.parse_args()
     root = options.root.resolve()

@@ -19,11 +19,13 @@ from lammps_runs import (
     run_lmp,
     run_lmp_well,
     scene,
+    start_lmp,
 )
 from lammps_scenes import rods, rods_3d
 from superellipsoid_scenes import particles
 
 from jamshape.files.lammps_text import write_data
+from jamshape.lammps.plugin import built_for
 
 pytestmark = pytest.mark.lammps
 
@@ -285,7 +287,7 @@ def test_atom_style_must_be_ellipsoid():
         run 0""")
     assert sentence == (
         "pair_style spherocylinder/harmonic found atom_style sphere, expected ellipsoid: use "
-        "'atom_style ellipsoid' and give every atom a shape."
+        "'atom_style ellipsoid', behind 'suffix off' if an accelerator adds one, and give every atom a shape."
     )
 
 
@@ -451,3 +453,61 @@ def test_a_plugin_that_was_built_for_another_lammps_is_refused(start, pretend, s
     again = r"this plugin was built: build jamshape again with this LAMMPS\."
     assert done.returncode != 0
     assert re.search(f"jamshape found {sentence} {again}", done.stdout), done.stdout
+
+
+NEWER = """
+ctypes.c_int.in_dll(plugin, "jamshape_newest_tested").value = 20200101
+plugin.jamshape_register.argtypes = [ctypes.c_void_p]
+lmp = start_lammps(["-log", "none"])
+plugin.jamshape_register(lmp.lmp)
+lmp.command("pair_style spherocylinder/harmonic sides one")
+print("goes on")
+"""
+
+
+def test_a_lammps_newer_than_the_tests_is_told_in_one_line(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", ANOTHER_BUILD.format(pretend="", start=NEWER)], env=environment(),
+        text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=60, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout
+    told = f"jamshape was built for LAMMPS {built_for()}, newer than 20200101, the newest of its tests: its checks at "
+    assert re.findall("^jamshape .*$", done.stdout, re.MULTILINE) == [f"{told}loading passed."]
+    assert "goes on" in done.stdout
+    silent = run_lmp_well(f"{load_plugin()}\nprint 'goes on'", tmp_path)
+    assert "jamshape was built" not in silent
+
+
+@pytest.mark.parametrize(
+    ("answer", "sentence"),
+    [
+        (
+            "lammps_extract_setting(void *handle, const char *name) { return name[0] == 't' ? 8 : -1; }",
+            (
+                r"jamshape read 4 as 'tagint' of LAMMPS \d{8}, expected 8: its headers are not those with which this "
+                r"plugin was built; build jamshape again with this LAMMPS\."
+            ),
+        ),
+        (
+            "lammps_has_style(void *handle, const char *kind, const char *name) { return kind[0] != 'f'; }",
+            (
+                r"jamshape added the fix style overdamped/affine to LAMMPS, which does not list it, expected a LAMMPS "
+                r"that does: use version \d{8} or an older one\."
+            ),
+        ),
+    ],
+    ids=["layout", "styles"],
+)
+def test_a_lammps_laid_out_otherwise_is_refused(answer, sentence, tmp_path):
+    """Functions of LAMMPS's library that answer as those of such a version would."""
+    (tmp_path / "answer.c").write_text(f"int {answer}")
+    made = ["cc", "-shared", "-fPIC", "-w", "answer.c", "-o", "answer.so"]
+    subprocess.run(made, cwd=tmp_path, check=True)
+    (tmp_path / "own.in").write_text(f"{load_plugin()}\nprint 'goes on'\n")
+    done = start_lmp(
+        "-in",
+        "own.in",
+        cwd=tmp_path,
+        env=environment() | {"LD_PRELOAD": str(tmp_path / "answer.so")},
+    )
+    assert re.search(sentence, error_of(done)), done.stdout

@@ -9,6 +9,7 @@ import sys
 import numpy as np
 import pytest
 from lammps_runs import (
+    QUIET,
     REPOSITORY,
     SHOW,
     Session,
@@ -18,6 +19,7 @@ from lammps_runs import (
     load_plugin,
     loaded,
     run_lmp_well,
+    start_lmp,
     state_of,
 )
 from lammps_scenes import dense, dense_mixture
@@ -163,7 +165,7 @@ BORDER_BONUS = """
 #include <cstdlib>
 namespace LAMMPS_NS {
 int AtomVecEllipsoid::pack_border_bonus(int n, int *, double *buf) {
-  const double numbers[] = {1, 2.5, 0.5, 0.5, 1, 0, 0, 0, 2, 2, 11, 12, 13};
+  const double numbers[] = {1, 2.5, 0.5, 0.5, 1, 0, 0, 0, 6, 4, 11, 12, 13};
   for (int k = 0; k < NUMBERS; ++k) buf[k] = numbers[k];
   return NUMBERS;
 }
@@ -178,9 +180,11 @@ int main() {
   lmp->atom = static_cast<LAMMPS_NS::Atom *>(calloc(1, 1 << 16));
   jamshape::ParticleView view(lmp);
   const auto s = view.semi_axes(0);
+  const auto n = view.exponents(0).value_or(std::array<double, 2>{0.0, 0.0});
   NotOurs other;
   auto *style = reinterpret_cast<LAMMPS_NS::AtomVec *>(&other);
-  std::printf("%g %g %g %d\\n", s[0], s[1], s[2], jamshape::compat::as_ellipsoids(style) == nullptr);
+  std::printf("%g %g %g %g %g %d\\n", s[0], s[1], s[2], n[0], n[1],
+              jamshape::compat::as_ellipsoids(style) == nullptr);
 }
 """
 
@@ -206,4 +210,29 @@ def test_as_many_numbers_as_lammps_packs_with_a_shape_find_room(numbers, tmp_pat
         [tmp_path / "view"], env={**environment(), "ASAN_OPTIONS": "detect_leaks=0"}, text=True,
         capture_output=True, check=False,
     )  # fmt: skip
-    assert done.stdout == "2.5 0.5 0.5 1\n", done.stderr[-2000:]
+    exponents = "6 4" if numbers == 13 else "0 0"
+    assert done.stdout == f"2.5 0.5 0.5 {exponents} 1\n", done.stderr[-2000:]
+
+
+@pytest.mark.parametrize("suffix", ["omp", "opt"])
+def test_the_suffix_of_an_accelerator_changes_no_bit(suffix, tmp_path):
+    found = []
+    for name, words in (("plain", ()), ("suffix", ("-sf", suffix))):
+        (tmp_path / "own.in").write_text(f"""{load_plugin()}
+            dimension 2
+            atom_style ellipsoid
+            create_random spherocylinder 64 0.4 1 type 1 5 1 1
+            pair_style spherocylinder/harmonic sides two
+            pair_coeff * * 1.0
+            fix squeeze all overdamped/affine drag 1.0 compress 1e-2
+            timestep 0.1
+            dump own all custom 600 {name}.dump id x y fx fy tqz
+            dump_modify own sort id format float %.17g
+            run 600""")
+        done = start_lmp(*QUIET, *words, "-in", "own.in", cwd=tmp_path)
+        if "package installed" in done.stdout:
+            pytest.skip(f"this LAMMPS has no package for the suffix {suffix}")
+        assert done.returncode == 0, done.stdout[-3000:]
+        found.append((tmp_path / f"{name}.dump").read_text())
+    assert found[0] == found[1]
+    assert len(found[0].splitlines()) == 2 * (9 + 64)

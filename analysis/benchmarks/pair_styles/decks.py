@@ -38,6 +38,8 @@ class Style(NamedTuple):
     """Fix that moves the particles without drag."""
     skin: float = SKIN
     is_ours: bool = False
+    is_everywhere: bool = True
+    """Whether all LAMMPS have it; those that do not are compared only if they are named."""
     instead: str = ""
     """Options of particles that take the place of the case's, at the same N and packing fraction."""
 

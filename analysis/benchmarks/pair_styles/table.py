@@ -97,6 +97,17 @@ GAYBERNE = _OF_ELLIPSOIDS(
 RESQUARED = _OF_ELLIPSOIDS(
     partial(reaching, "pair_style resquared {reach}\npair_coeff * * 1 1 1 1 1 1 1 1")
 )
+GRANULAR = Style(
+    atoms="atom_style ellipsoid superellipsoid\nnewton off\ncomm_modify vel yes",
+    pair=partial(
+        fixed,
+        "pair_style granular/superellipsoid\n"
+        "pair_coeff * * hooke 1 0 tangential classic 0 0 0 damping mass_velocity",
+    ),
+    write=partial(write_data, blocks=True),
+    nve=_FLIGHT,
+    is_everywhere=False,
+)
 
 _PLANE = Bench(
     dimension=2,
@@ -173,8 +184,9 @@ BENCHES = {
             "ours": ours(2, ELLIPSOIDS, _FLIGHT),
             "gayberne": GAYBERNE,
             "resquared": RESQUARED,
+            "granular": GRANULAR,
         },
-        faster_than={"speed over gayberne": "gayberne"},
+        faster_than={"speed over gayberne": "gayberne", "speed over granular": "granular"},
         dearer_than={},
         tiles=(2, 3, 4),
     ),

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 from jamshape.command import parser_of, report
 from jamshape.commands.plugin import version_of_lmp, version_of_module
-from jamshape.lammps.plugin import PluginError, built_for, plugin_path
+from jamshape.lammps.plugin import PluginError, built_for, newest_tested, plugin_path
 from jamshape.recording.workers import cores
 
 NEEDED = ("numpy", "scipy", "h5py", "matplotlib", "tqdm", "lazy-loader")
@@ -104,7 +104,9 @@ def lammps() -> list[Found]:
         path, version = plugin_path(), built_for()
     except PluginError as error:
         return [Found("plugin", None, str(error), is_needed=True)]
-    found = [Found("plugin", f"for LAMMPS {version} at {path}", is_needed=True)]
+    tested = newest_tested()
+    newer = f", newer than {tested}, the newest tested" if version > tested else ""
+    found = [Found("plugin", f"for LAMMPS {version}{newer} at {path}", is_needed=True)]
     for name, other in (("Python module lammps", version_of_module()), ("lmp", version_of_lmp())):
         is_it = other == version
         told = f"is LAMMPS {other}" if other else "is not there"

@@ -51,7 +51,7 @@ from jamshape.files.unpacked import opened_plain
 from jamshape.packing import Box, Lengths, Packing, angle_from_quaternion, cuboid_around
 from jamshape.packing.columns import flat, joined
 from jamshape.shapes.shape import Stiffness, power_of, stiffness_of, stiffness_text, stiffness_told
-from jamshape.shapes.table import SHAPES
+from jamshape.shapes.table import SHAPES, shape_named
 
 _TITLE = "LAMMPS data file by jamshape"
 _EXPONENT_COMMENT, _BLOCK_COMMENT, _FORM_COMMENT = "exponent=", "block=", "form="
@@ -123,8 +123,8 @@ def write_data(
     density : float, [mass / length^3]
         Mass density, from which LAMMPS computes masses.
     blocks : bool
-        Write n1 and n2 of superellipsoids behind each row of Ellipsoids, for ``atom_style ellipsoid superellipsoid`` of
-        LAMMPS from 2026 on; other versions do not read such rows.
+        Write n1 and n2 behind each row of Ellipsoids, for ``atom_style ellipsoid superellipsoid`` of LAMMPS from 2026 on,
+        2 and 2 for shapes without exponents; other atom styles and versions do not read such rows.
 
     Raises
     ------
@@ -148,10 +148,10 @@ def write_data(
         np.savetxt(file, atoms, fmt=["%d"] * 3 + ["%.17g"] * 4 + ["%d"] * 3)
         file.write("\nEllipsoids\n\n")
         row = ["%d"] + ["%.17g"] * 7
-        if packing.shape.has_exponent and (blocks or packing.form.shape[1] == len(_BLOCKS)):
+        has_both = packing.shape.has_exponent and packing.form.shape[1] == len(_BLOCKS)
+        if blocks or has_both:
             row += ["%.17g" if blocks else f"# {_BLOCK_COMMENT}%.17g", "%.17g"]
-            both = packing.shape.widened(packing.form, len(_BLOCKS))
-            ellipsoids = np.column_stack([ellipsoids, both])
+            ellipsoids = np.column_stack([ellipsoids, _both_exponents(packing)])
         elif packing.shape.has_exponent:
             row += [f"# {_EXPONENT_COMMENT}%.17g"]
             ellipsoids = np.column_stack([ellipsoids, packing.exponent])
@@ -179,6 +179,13 @@ def write_dump(path: PathLike, packings: Packing | Iterable[Packing]) -> None:
     with replacing(path) as temporary, temporary.open("w", encoding="utf-8") as file:
         for packing in frames:
             _write_frame(file, packing)
+
+
+def _both_exponents(packing: Packing) -> FloatArray:
+    """Return n1 and n2 (N, 2), those of an ellipsoid if the shape has none."""
+    if packing.shape.has_exponent:
+        return packing.shape.widened(packing.form, len(_BLOCKS))
+    return np.full((packing.n, len(_BLOCKS)), 2.0)
 
 
 def _forms(packing: Packing) -> tuple[FloatArray, IntArray]:
@@ -418,6 +425,9 @@ def _packing(path: PathLike, frame: _Frame, wanted: Wanted) -> Packing:
         return np.column_stack([frame.columns[name] for name in names])
 
     exponent, others = _exponent(frame.columns), dict(frame.others)
+    told = wanted.shape or frame.said.shape
+    if told and not shape_named(told).has_exponent and (exponent == 1).all():
+        exponent = np.empty(0)  # those of the ellipsoids in which LAMMPS holds any shape
     form = others.pop("form", frame.columns.get("form", np.empty((0, 0))))
     quaternion = stack(_QUATERNION)
     there = Geometry(stack(_POSITION), quaternion, stack(_DIAMETERS), frame.bounds, frame.tilt)
@@ -658,17 +668,15 @@ def _require_ellipsoids(atoms: Mapping[str, FloatArray]) -> None:
 
 
 def _ellipsoids(rows: Sequence[str], comments: Sequence[str]) -> dict[str, FloatArray]:
-    """Read the section Ellipsoids, with exponents if present."""
-    if len(rows[0].split()) == len(_ELLIPSOIDS) + len(_BLOCKS):
-        wide = (*_ELLIPSOIDS, *_BLOCKS)
-        return _columns(rows, wide, wide)
+    """Read the section Ellipsoids, with exponents and forms if present."""
+    has_blocks = len(rows[0].split()) == len(_ELLIPSOIDS) + len(_BLOCKS)
+    names = (*_ELLIPSOIDS, *_BLOCKS) if has_blocks else _ELLIPSOIDS
     ours = {_EXPONENT_COMMENT: _EXPONENT, _BLOCK_COMMENT: _BLOCKS, _FORM_COMMENT: ("form",)}
     for beginning, more in ours.items():
         if all(comment.startswith(beginning) for comment in comments):
             told = [comment.removeprefix(beginning) for comment in comments]
-            names = (*_ELLIPSOIDS, *more)
-            return _columns([f"{a} {b}" for a, b in zip(rows, told, strict=True)], names, names)
-    return _columns(rows, _ELLIPSOIDS, _ELLIPSOIDS)
+            rows, names = [f"{a} {b}" for a, b in zip(rows, told, strict=True)], (*names, *more)
+    return _columns(rows, names, names)
 
 
 def _form(text: str, columns: Mapping[str, FloatArray]) -> dict[str, FloatArray]:

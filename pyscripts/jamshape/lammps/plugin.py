@@ -16,7 +16,7 @@ _READS_ONCE = 20210929
 _QUOTES = ('"', "'")
 
 # Label in the plugin, which cannot be loaded outside LAMMPS.
-_LABEL = re.compile(rb"jamshape plugin for LAMMPS (\d+)\0")
+_LABEL = re.compile(rb"jamshape plugin for LAMMPS (\d+), newest tested (\d+)\0")
 
 
 class PluginError(RuntimeError):
@@ -175,12 +175,31 @@ def built_for(plugin: Path | None = None) -> int:
     >>> built_for() > 20200000
     True
     """
-    path = plugin or plugin_path()
+    return int(_label_of(plugin or plugin_path())[1])
+
+
+def newest_tested() -> int:
+    """Return the newest LAMMPS version that the tests of the plugin of this installation have run with.
+
+    Raises
+    ------
+    PluginError
+        If there is no plugin.
+
+    Examples
+    --------
+    >>> newest_tested() >= 20260704
+    True
+    """
+    return int(_label_of(plugin_path())[2])
+
+
+def _label_of(path: Path) -> re.Match[bytes]:
     found = _LABEL.search(path.read_bytes())
     if found is None:
         msg = f"Found no label of jamshape in {path}, expected one: install jamshape again."
         raise PluginError(msg)
-    return int(found[1])
+    return found
 
 
 def _folder_of_binaries() -> Path:

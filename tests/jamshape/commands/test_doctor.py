@@ -5,7 +5,7 @@ from importlib import metadata
 import pytest
 
 from jamshape.commands import doctor
-from jamshape.lammps.plugin import PluginError, built_for
+from jamshape.lammps.plugin import PluginError, built_for, newest_tested
 
 
 @pytest.mark.lammps
@@ -52,3 +52,12 @@ def test_another_lammps_is_named(jamshape, monkeypatch):
     ended = jamshape("doctor")
     assert ended.code == 1
     assert f"lmp                   is LAMMPS 20230802, expected {built_for()}" in ended.out
+
+
+@pytest.mark.lammps
+def test_a_lammps_newer_than_the_tested_ones_is_told(jamshape, monkeypatch):
+    monkeypatch.setattr(doctor, "newest_tested", lambda: 20200101)
+    ended = jamshape("doctor")
+    assert not ended.code
+    assert f"for LAMMPS {built_for()}, newer than 20200101, the newest tested at " in ended.out
+    assert newest_tested() >= 20260704

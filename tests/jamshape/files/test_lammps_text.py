@@ -4,9 +4,11 @@ from dumps import iter_dump, read_dump
 from lammps_runs import run_lmp_well
 from nasty import NASTY, assert_identical, nasty_packing, tilted_box
 
+import jamshape as js
 from jamshape.files.h5md import FileFormatError, write_run
 from jamshape.files.lammps_text import read_any, read_data, write_data, write_dump
 from jamshape.packing import Box
+from jamshape.protocols.random_start import random_packing
 
 RODS = "spherocylinder"
 COLUMNS = ["id", "type", "x", "y", "z"]
@@ -435,6 +437,23 @@ def test_rows_for_lammps_from_2026_on_have_both_exponents(path, make):
     rows = path.read_text().partition("Ellipsoids\n\n")[2].splitlines()
     assert all(len(row.split()) == 10 and "#" not in row for row in rows)
     assert_identical(read_data(path), expected)
+
+
+@pytest.mark.parametrize(
+    "particles",
+    [js.Spherocylinders(alpha=2), js.Dimers(), js.Clumps(discs=js.dimer_discs(0.5))],
+    ids=["rods", "dimers", "clumps"],
+)
+def test_rows_for_lammps_from_2026_on_have_the_exponents_of_ellipsoids(path, particles):
+    """With which LAMMPS holds the particles of any other shape."""
+    packing = random_packing(8, 0.2, 1, particles)
+    write_data(path, packing)
+    expected = read_data(path)
+    write_data(path, packing, blocks=True)
+    rows = path.read_text().partition("Ellipsoids\n\n")[2].splitlines()
+    assert all(row.partition("#")[0].split()[8:] == ["2", "2"] for row in rows)
+    assert_identical(read_data(path), expected)
+    assert expected.shape_style == packing.shape_style
 
 
 @pytest.mark.parametrize("columns", [["block1", "block2"], ["c_block1", "c_block2"], ROUNDNESS])

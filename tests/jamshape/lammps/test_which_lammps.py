@@ -15,7 +15,7 @@ from jamshape.lammps.plugin import PluginError
 def built_for_2025(monkeypatch, tmp_path):
     """A plugin that says that it was built for the LAMMPS of 22 July 2025."""
     path = tmp_path / "jamshape_plugin.so"
-    path.write_bytes(b"\x7fELF...jamshape plugin for LAMMPS 20250722\0...")
+    path.write_bytes(b"\x7fELF...jamshape plugin for LAMMPS 20250722, newest tested 20260704\0...")
     monkeypatch.setattr(plugin, "plugin_path", lambda: path)
     return path
 
