@@ -64,7 +64,7 @@ def of_clones(root):
     take_clone(root)
     yield "first clone, with Debian's packages", timed(root, CLONED)
     second = f"{INSIDE}.second"
-    timed(root, f"git clone -q /{INSIDE} /{second}")
+    said_by("git", "clone", "-q", root / INSIDE, root / second)
     yield "second clone", timed(root, CLONED, second)
 
 
