@@ -87,7 +87,10 @@ def main():
     try:
         require_tools(root)
         bootstrap(root, options.release, options.mirror)
-        require(not (root / INSIDE).exists(), f"found {INSIDE} in {root}, expected a bare Debian: remove it")
+        require(
+            not (root / INSIDE).exists(),
+            f"found {INSIDE} in {root}, expected a bare Debian: remove it",
+        )
         take_network(root)
         done = list(of_a_wheel(root, options.wheel) if options.wheel else of_clones(root))
     except (UnexpectedError, OSError) as error:

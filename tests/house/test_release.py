@@ -14,7 +14,9 @@ SETTINGS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 PROJECT = SETTINGS["project"]
 RECIPE = (ROOT / "conda" / "recipe.yaml").read_text(encoding="utf-8")
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
-PARTS = set(re.findall(r"^  (\w+)\) setup;", (ROOT / "run").read_text(encoding="utf-8"), re.MULTILINE))
+PARTS = set(
+    re.findall(r"^  (\w+)\) setup;", (ROOT / "run").read_text(encoding="utf-8"), re.MULTILINE)
+)
 
 
 def test_the_recipe_is_of_this_version():
@@ -28,7 +30,10 @@ def test_the_recipe_is_of_this_version():
 def test_the_recipe_asks_for_what_the_project_asks_for(section, asked):
     text = RECIPE.split(f"\n  {section}:\n")[1].split("\n\n")[0]
     listed = {line.strip().removeprefix("- ") for line in text.splitlines()}
-    missing = {requirement.replace(">=", " >=").replace("matplotlib ", "matplotlib-base ") for requirement in asked}
+    missing = {
+        requirement.replace(">=", " >=").replace("matplotlib ", "matplotlib-base ")
+        for requirement in asked
+    }
     assert missing <= listed
 
 
