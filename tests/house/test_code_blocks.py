@@ -41,6 +41,7 @@ NOT_RUN = [
     Told("docs/how-to/decks.md", "-var jamshape", "needs a clone at a reader's path; tests/decks/test_decks.py"),
     Told("docs/how-to/install.md", "tests/debian", "makes a Debian as root, or a LAMMPS"),
     Told("docs/how-to/install.md", "pip", "downloads and compiles; ./run wheel does it"),
+    Told("docs/development/releases.md", "", "downloads and compiles; ./run wheel does it"),
     Told("docs/how-to/reproduce.md", "pip install", "downloads packages"),
     Told("docs/how-to/reproduce.md", "--known", "needs packings of a paper; tests/scripts/test_sample_tables.py"),
     Told("docs/how-to/reproduce.md", "snakemake -s", "needs Slurm; tests/scripts/test_reproduce_with_snakemake.py"),

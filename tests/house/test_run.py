@@ -9,7 +9,7 @@ import pytest
 from valgrind_decks import found_in
 
 RUN = Path(__file__).parents[2] / "run"
-PARTS = ("setup", "demo", "test", "lint", "docs", "sanitize", "valgrind", "wheel")
+PARTS = ("setup", "demo", "test", "lint", "docs", "sanitize", "sdist", "valgrind", "wheel")
 
 
 def run(*words):
@@ -27,7 +27,7 @@ def test_unknown_words_are_refused():
     done = run("sing")
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.strip() == (
-        "./run: unknown command 'sing', expected setup, demo, test, lint, docs, sanitize, valgrind or wheel; ./run describes them."
+        "./run: unknown command 'sing', expected setup, demo, test, lint, docs, sanitize, sdist, valgrind or wheel; ./run describes them."
     )
 
 

@@ -124,7 +124,8 @@ bool each_two_sides(const SpheropolygonBody<D, T> &i, const SpheropolygonBody<D,
       const Vec<D, T> apart = r + one.middle - two.middle;
       const T near = reach + one.half_length + two.half_length;
       if (!(norm_sq(apart) < near * near)) continue;
-      const SpinePair<D, T> spines{apart, one.along, one.half_length, two.along, two.half_length};
+      const SpinePair<D, T> spines{apart, one.along, static_cast<Plain<T>>(one.half_length),
+                                   two.along, static_cast<Plain<T>>(two.half_length)};
       if (!visit(one.side, two.side, spines)) return true;
     }
   }
