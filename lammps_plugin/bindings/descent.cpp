@@ -98,9 +98,9 @@ void export_descent(nb::module_ &m)
           [](DescentStop *place, double tolerance, double lowest, std::int64_t evaluations,
              double seconds, double rounding, std::int64_t patience, double newton_below,
              bool is_near, double longest_step, double widest_turn) {
-            new (place) DescentStop{tolerance,    lowest,  evaluations,
+            new (place) DescentStop{tolerance,    lowest,   evaluations,
                                     seconds,      rounding, patience,
-                                    newton_below, is_near, {longest_step, widest_turn}};
+                                    newton_below, is_near,  {longest_step, widest_turn}};
           },
           "tolerance"_a, "lowest"_a, "evaluations"_a, "seconds"_a, "rounding"_a, "patience"_a,
           "newton_below"_a, "is_near"_a, "longest_step"_a, "widest_turn"_a);
@@ -127,9 +127,10 @@ void export_descent(nb::module_ &m)
                    "(n,) derivative of the gradient with respect to the strain.")
       .def("solve", &PosedNewton::solve, "right"_a, "accuracy"_a,
            "Solve for each row of right (k, n), to this relative accuracy.")
-      .def("learn", &PosedNewton::learn, "tries"_a, "has_closed"_a,
-           "Lower the shift after a step accepted at once, raise it after one that was far off. With"
-           " complete factors a step that a closing contact stopped counts as accepted.")
+      .def(
+          "learn", &PosedNewton::learn, "tries"_a, "has_closed"_a,
+          "Lower the shift after a step accepted at once, raise it after one that was far off. With"
+          " complete factors a step that a closing contact stopped counts as accepted.")
       .def_prop_ro("shift", &PosedNewton::shift);
   nb::borrow<nb::class_<LocalEnergyModel>>(nb::type<LocalEnergyModel>())
       .def("part_within", &part_within, "x"_a, "longest_step"_a, "widest_turn"_a,

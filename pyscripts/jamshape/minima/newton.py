@@ -42,9 +42,7 @@ def _descend(descent: Descent, newton_below: float, *, is_near: bool = False) ->
     return outcome
 
 
-def _run(
-    descent: Descent, newton_below: float, patience: int, *, is_near: bool = False
-) -> Outcome:
+def _run(descent: Descent, newton_below: float, patience: int, *, is_near: bool = False) -> Outcome:
     landscape, stop = descent.landscape, descent.stop
     about = DescentStop(
         tolerance=stop.tolerance,

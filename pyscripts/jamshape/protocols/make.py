@@ -233,9 +233,7 @@ class Pipeline:
 
     at_mark = True
 
-    def __init__(
-        self, recipe: Recipe, source: Path | None, checkpoint: Checkpoint | None
-    ) -> None:
+    def __init__(self, recipe: Recipe, source: Path | None, checkpoint: Checkpoint | None) -> None:
         self._recipe, self._source = recipe, source
         told = checkpoint or {"stage": 0, "frame": -1, "wall_seconds": 0.0, "evaluations": 0}
         self._began = time.perf_counter() - told["wall_seconds"]
