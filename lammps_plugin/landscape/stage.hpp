@@ -98,7 +98,7 @@ class StageSolver {
     Point at = begin(guess, other);
     see_kinks(at);
     Vector before = Vector::Zero(guess.size());
-    for (; directions < most() && !at.sums.is_refused(); ++directions) {
+    for (double first = 0.0; directions < most() && !at.sums.is_refused(); ++directions) {
       const Correction correction = correction_at(at);
       if (!known.factors || !correction.step.allFinite()) break;
       if (is_last(correction.size)) {
@@ -106,6 +106,8 @@ class StageSolver {
         at.x += correction.step;
         return end(std::move(at), true);
       }
+      if (directions == 0) first = correction.size;
+      if (directions >= PATIENCE && correction.size > first) break;
       size_before = correction.size;
       const double part = about.part_within(correction.step.data(), limits.step);
       const Vector step = part * correction.step;
@@ -136,6 +138,8 @@ class StageSolver {
  private:
   /// A stage is given up after this many directions.
   static constexpr int DIRECTIONS = 10;
+  /// After this many, also if a correction exceeds the first one.
+  static constexpr int PATIENCE = 5;
 
   /// Directions that suffice for smooth stages; later steps are checked for kinks.
   static constexpr int SMOOTH = 3;
