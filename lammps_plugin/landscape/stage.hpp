@@ -98,7 +98,7 @@ class StageSolver {
     Point at = begin(guess, other);
     see_kinks(at);
     Vector before = Vector::Zero(guess.size());
-    for (; directions < most() && !at.sums.is_refused(); ++directions) {
+    for (double first = 0.0; directions < most() && !at.sums.is_refused(); ++directions) {
       const Correction correction = correction_at(at);
       if (!known.factors || !correction.step.allFinite()) break;
       if (is_last(correction.size)) {
@@ -106,21 +106,24 @@ class StageSolver {
         at.x += correction.step;
         return end(std::move(at), true);
       }
+      if (directions == 0) first = correction.size;
+      if (directions >= PATIENCE && correction.size > first) break;
       size_before = correction.size;
       const double part = about.part_within(correction.step.data(), limits.step);
       const Vector step = part * correction.step;
+      Point tried = point(at.x + step);
+      const double reversed = reversal(at, tried, step, part);
       move_weights(correction, part);
       const double down = pushed(at).dot(step);
-      Point tried = point(at.x + step);
       if (!tried.sums.is_refused()) {
-        see_kinks(tried);
+        const bool again = see_kinks(tried);
         if (find_kinks(at, tried)) {
           size_before = 0.0;
         } else if (is_past_a_kink(at, tried, step, before, correction.size)) {
           tried = between(at, std::move(tried), limits.accuracy / correction.size);
         } else if (const double up = pushed(tried).dot(step); up > -down) {
-          const double shorter =
-              kinks_held().empty() ? lowest(at, tried, step, part) : down / (down - up);
+          // The stiffness across a kink that holds the state again would hide the closing bond.
+          const double shorter = reversed > 0.0 && !again ? reversed : down / (down - up);
           tried = point(at.x + shorter * step);
           see_kinks(tried);
           size_before = 0.0;
@@ -136,6 +139,8 @@ class StageSolver {
  private:
   /// A stage is given up after this many directions.
   static constexpr int DIRECTIONS = 10;
+  /// After this many, also if a correction exceeds the first one.
+  static constexpr int PATIENCE = 5;
 
   /// Directions that suffice for smooth stages; later steps are checked for kinks.
   static constexpr int SMOOTH = 3;
@@ -336,22 +341,25 @@ class StageSolver {
     return any;
   }
 
-  /// Looks at the kinks from a point, and holds those that it is on the wrong side of.
-  void see_kinks(Point &at)
+  /// Looks at the kinks from a point, and holds those that it is on the wrong side of; whether
+  /// there are any.
+  bool see_kinks(Point &at)
   {
-    if (held.empty() || at.sums.is_refused()) return;
+    bool again = false;
+    if (held.empty() || at.sums.is_refused()) return again;
     at.kinks = about.kinks_at({at.x.data(), 0.0}, held, stage.extended);
     std::size_t kept = 0;
     for (std::size_t k = 0; k < held.size(); ++k) {
       const KinkThere &there = at.kinks[k];
       if (!there.exists) continue;
       if (!held[k].is_held && (held[k].weight < 0.5 ? there.gap > 0.0 : there.gap < 0.0))
-        held[k].is_held = true;
+        held[k].is_held = again = true;
       held[kept] = held[k];
       at.kinks[kept++] = there;
     }
     held.resize(kept);
     at.kinks.resize(kept);
+    return again;
   }
 
   /// Holds the kinks that lie between two points; whether there are new ones.
@@ -415,11 +423,28 @@ class StageSolver {
            (is_near && 2.0 * size * size <= limits.accuracy * size_before);
   }
 
-  /// The minimised function.
+  /// The minimised function; near kinks that of the first of both pieces, with the weight of their
+  /// difference and, where the state is held, the stiffness across: its gradient is `pushed`.
   double energy(const Point &at) const
   {
     const Vector by = at.x - stage.centre;
-    return at.sums.energy + 0.5 * by.dot(stage.drag.cwiseProduct(by));
+    double sum = at.sums.energy + 0.5 * by.dot(stage.drag.cwiseProduct(by));
+    for (std::size_t k = 0; k < held.size(); ++k) {
+      const double gap = at.kinks[k].gap;
+      sum += held[k].weight * gap - std::max(gap, 0.0);
+      if (held[k].is_held) sum += 0.5 * held[k].stiffness * gap * gap;
+    }
+    return sum;
+  }
+
+  /// The fraction of a step that minimises the energy at the weights before the step, if the force
+  /// along it reverses and grows; else 0.
+  double reversal(const Point &at, Point &tried, const Vector &step, double part) const
+  {
+    if (tried.sums.is_refused()) return 0.0;
+    if (!held.empty()) tried.kinks = about.kinks_at({tried.x.data(), 0.0}, held, stage.extended);
+    const bool reverses = pushed(tried).dot(step) > -pushed(at).dot(step);
+    return reverses ? lowest(at, tried, step, part) : 0.0;
   }
 
   /// The fraction of a step that minimises the energy, assuming the slope of the factors, of which
@@ -427,8 +452,8 @@ class StageSolver {
   /// slopes at both ends are matched.
   double lowest(const Point &at, const Point &tried, const Vector &step, double part) const
   {
-    const double slope = -at.gradient.dot(step);
-    const double force = tried.gradient.dot(step) / slope + 1.0 - part;
+    const double slope = -pushed(at).dot(step);
+    const double force = pushed(tried).dot(step) / slope + 1.0 - part;
     const double work = (energy(tried) - energy(at)) / slope + 1.0 - 0.5 * part;
     const double closed = std::clamp(2.0 * work / force, 1e-3, 1.0);  // including that bond
     const double stiffness = force / closed;

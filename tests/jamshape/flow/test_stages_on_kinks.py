@@ -150,6 +150,29 @@ def test_a_kink_that_the_drag_leads_off_is_released():
     assert np.abs(gradient).max() < 1e-6 * units.force
 
 
+def test_a_particle_that_hits_another_while_others_are_on_a_kink_stops_there_at_once():
+    """The drag, a thousandth as stiff as a bond, draws a free rod 0.08 up to another one and 0.02 into it."""
+    pair = side_by_side()
+    position = np.vstack([np.asarray(pair.position, float), [[10.0, 10.0], [10.0, 11.48]]])
+    packing = js.Packing(
+        position=position, orientation=[1e-4, 0.0, 0.0, np.pi / 2],
+        diameters=[[3.0, 1.0, 1.0], [4.2, 1.0, 1.0], [2.0, 1.0, 1.0], [1.8, 1.0, 1.0]],
+        species=[1, 2, 3, 4], id=[1, 2, 3, 4], box=pair.box,
+    )  # fmt: skip
+    packing = packing.with_(law=packing.law.but(sides=1))
+    model, drag, units = stage_of(packing, 1000.0)
+    still = np.zeros(len(drag))
+    held = model.solve(Stage(drag, still, (still, still)), None, units, 1e-9)
+    assert held.solved
+    assert len(held.kinks) == 1
+    centre = held.x.copy()
+    centre[Landscape(packing).column[2, 1]] += 0.1
+    end = model.solve(Stage(drag, centre, (held.x, still)), held.kinks, units, 1e-9)
+    assert end.solved
+    assert end.directions <= 5
+    assert len(end.kinks) == 1
+
+
 @pytest.mark.lammps
 @pytest.mark.parametrize("sides", [1, 2])
 def test_both_integrators_compress_nearly_round_rods_alike(sides, tmp_path, measured):
