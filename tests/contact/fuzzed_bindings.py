@@ -196,7 +196,7 @@ def of_vicinity(fuzz, of, dimension, poses):
                         "NewtonSystem.solve", system.solve, right=np.ones((1, n)), accuracy=1e-3
                     )
                 elif name == "learn":
-                    fuzz.call("NewtonSystem.learn", system.learn, tries=2)
+                    fuzz.call("NewtonSystem.learn", system.learn, tries=2, has_closed=True)
                 elif name == "prepare":
                     fuzz.call("NewtonSystem.prepare", system.prepare)
                 else:
@@ -230,7 +230,7 @@ def of_vicinity(fuzz, of, dimension, poses):
     def descend():
         stop = fuzz.call(
             "DescentStop", _contact.DescentStop, tolerance=1e-8, lowest=0.0, evaluations=20, seconds=0.1,
-            rounding=1e-16, newton_below=1e-2, is_near=False, longest_step=0.1, widest_turn=0.1,
+            rounding=1e-16, patience=10, newton_below=1e-2, is_near=False, longest_step=0.1, widest_turn=0.1,
         )  # fmt: skip
         if stop is not None:
             end = fuzz.call("descend", about.descend, stop=stop, shift=1.0, tell=lambda _: None)

@@ -202,7 +202,7 @@ def test_names_of_before_0_1_0(jamshape, tmp_path, packing):
     old = {"p": 1.5, "w1": 1.0, "w2": 1.0, "protocol": 1, "outcome": "corner"}
     write_packing(path, packing, old, {"p": 1e-6})
     aged(path, version=1)
-    with pytest.raises(FileFormatError, match=r"0\.1\.0 \(format 1\), expected format 3"):
+    with pytest.raises(FileFormatError, match=r"\(format 1\), expected format 3"):
         read_attributes(path)
     assert jamshape("convert", path).report["files"][0]["version"] == 1
     new = {"exponent": 1.5, "w1": 1.0, "w2": 1.0, "protocol": "yuan-2019-1", "outcome": "kink"}
