@@ -110,7 +110,9 @@ def write_formula(writer: HTML5Translator, node: nodes.math) -> None:
 def write_equation(writer: HTML5Translator, node: nodes.math_block) -> None:
     """Write a displayed formula, in a box that scrolls where a screen is narrower."""
     equation = convert(node.astext(), display="block")
-    writer.body.append(f'<div class="math" style="overflow-x: auto">{equation}</div>')
+    writer.body.append(
+        f'<div class="math" style="overflow: auto hidden; padding-block: 0.5em">{equation}</div>'
+    )
     raise nodes.SkipNode
 
 
