@@ -78,7 +78,7 @@ class PosedNewton {
     return solutions(right, [&](const auto &side) { return system.solve(side, accuracy); });
   }
 
-  void learn(int tries, bool has_closed) { system.learn(tries, has_closed); }
+  void learn(double part, bool has_closed) { system.learn(part, has_closed); }
   double shift() const { return system.shift; }
 
  private:
@@ -128,9 +128,9 @@ void export_descent(nb::module_ &m)
       .def("solve", &PosedNewton::solve, "right"_a, "accuracy"_a,
            "Solve for each row of right (k, n), to this relative accuracy.")
       .def(
-          "learn", &PosedNewton::learn, "tries"_a, "has_closed"_a,
-          "Lower the shift after a step accepted at once, raise it after one that was far off. With"
-          " complete factors a step that a closing contact stopped counts as accepted.")
+          "learn", &PosedNewton::learn, "part"_a, "has_closed"_a,
+          "Lower the shift after a step taken as a whole, raise it if a small part was. With"
+          " complete factors a step that a closing contact stopped counts as a whole.")
       .def_prop_ro("shift", &PosedNewton::shift);
   nb::borrow<nb::class_<LocalEnergyModel>>(nb::type<LocalEnergyModel>())
       .def("part_within", &part_within, "x"_a, "longest_step"_a, "widest_turn"_a,

@@ -130,7 +130,8 @@ class Descent {
   using Clock = std::chrono::steady_clock;
 
   /// A gain of a method is a fall of the energy or of the residual below these fractions of its
-  /// lowest value; either may fall for long while the other does not.
+  /// lowest value; either may fall for long while the other does not. While rods slide both hardly
+  /// fall, but contacts close one by one until a minimum is reached: that counts for Newton's method.
   static constexpr double LESS_ENERGY = 0.98, LESS_RESIDUAL = 0.7;
   /// L-BFGS gains in waves: Newton's method takes over only after this many evaluations without a
   /// gain.
@@ -143,9 +144,9 @@ class Descent {
   static constexpr double AWAY = 30.0, LATER = 0.3;
   static constexpr int MOST_RETURNS = 5;
 
-  /// L-BFGS also resumes if Newton's method did not gain in this many evaluations from a start
-  /// declared near a minimum, with complete factors and without.
-  static constexpr std::int64_t NO_GAIN = 250, NO_CHEAP_GAIN = 35;
+  /// L-BFGS also resumes if a start declared near a minimum is not near one after this many
+  /// evaluations, with complete factors; without them if none of the last ones gained.
+  static constexpr std::int64_t NEAR = 250, NO_CHEAP_GAIN = 35;
 
   /// Largest number of saddles left in one minimisation.
   static constexpr int MOST_SADDLES = 5;
@@ -170,6 +171,9 @@ class Descent {
   static constexpr double COARSE = 0.1;
 
   static constexpr int TRIES = 25;
+  /// Where closing contacts stop steps, one step resembles the last: a line search begins at this
+  /// multiple of its part, and grows by it while the force has not fallen.
+  static constexpr double WIDER = 10.0;
   static constexpr double TELL_SECONDS = 0.2;
 
   /// Contacts start from the previous ones, as long as this object lives.
@@ -187,7 +191,7 @@ class Descent {
   struct Line {
     Vector x;
     LandscapeSums sums;
-    int tries;
+    double factor;
   };
 
   LocalEnergyModel &about;
@@ -201,6 +205,8 @@ class Descent {
   std::vector<DescentRow> rows;
   std::int64_t evaluations = 0;
   double least_energy = INFINITY, least_residual = INFINITY;
+  std::size_t most_bonds = 0;  // since the energy or the residual gained
+  double reach = 1.0;          // first part of a Newton step that a line search tries
   std::int64_t best = 0;       // when the present method gained
   std::int64_t last_gain = 0;  // when any method gained
   bool extended = false;
@@ -238,8 +244,9 @@ class Descent {
   bool is_astray() const
   {
     if (is_near) {
-      const std::int64_t most = about.has_complete_factors() ? NO_GAIN : NO_CHEAP_GAIN;
-      return residual() >= newton_below && evaluations > best + most;
+      const bool is_late = about.has_complete_factors() ? evaluations > NEAR
+                                                        : evaluations > best + NO_CHEAP_GAIN;
+      return residual() >= newton_below && is_late;
     }
     if (about.has_complete_factors() && returns == MOST_RETURNS) return false;
     return residual() >= AWAY * newton_below;
@@ -306,7 +313,7 @@ class Descent {
   void learn(const Line &line, const LandscapeSums &from)
   {
     if (by_newton) {
-      system.learn(line.tries, line.sums.n_bonds > from.n_bonds);
+      system.learn(line.factor, line.sums.n_bonds > from.n_bonds);
     } else {
       memory.learn(line.x, line.sums.gradient - from.gradient);
     }
@@ -351,6 +358,10 @@ class Descent {
       last_gain = best = evaluations;
       least_energy = std::min(least_energy, density);
       least_residual = std::min(least_residual, left);
+      most_bonds = sums.n_bonds;
+    } else if (by_newton && sums.n_bonds > most_bonds) {
+      last_gain = best = evaluations;
+      most_bonds = sums.n_bonds;
     }
     if (std::chrono::duration<double>(Clock::now() - told).count() > TELL_SECONDS) {
       told = Clock::now();
@@ -384,15 +395,19 @@ class Descent {
   {
     const double slope = from.gradient.dot(step);
     Bracket bracket(slope);
-    double factor = 1.0;
+    double factor = by_newton ? reach : 1.0;
     for (int n = 1;; ++n) {
-      Line line{factor * step, {}, n};
+      Line line{factor * step, {}, factor};
       line.sums = evaluate(line.x);
       const bool refused = line.sums.is_refused();
       const double here = refused ? INFINITY : line.sums.gradient.dot(step);
-      const bool is_good = std::abs(here) <= 0.9 * std::abs(slope) || (here < 0.0 && n == 1);
-      if (is_good || n >= (refused ? 2 * TRIES : TRIES)) return line;
-      factor = bracket.next(factor, here);
+      const bool is_good = std::abs(here) <= 0.9 * std::abs(slope) || (here < 0.0 && factor == 1.0);
+      if (is_good || n >= (refused ? 2 * TRIES : TRIES)) {
+        reach = std::min(1.0, WIDER * factor);
+        return line;
+      }
+      const double next = bracket.next(factor, here);
+      factor = std::isfinite(next) ? next : std::min(1.0, WIDER * factor);
     }
   }
 };

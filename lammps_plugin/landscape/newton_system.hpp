@@ -89,15 +89,15 @@ class NewtonSystem {
     return found.last;
   }
 
-  /// Lowers the shift after a step that was accepted at once, raises it after one that was far off.
+  /// Lowers the shift after a step that was taken as a whole, raises it if a small part was.
   /// A contact that closed and stopped the step says nothing about the matrix: complete factors
   /// take it in next, at any shift; iterations take longer the lower the shift.
-  void learn(int tries, bool has_closed)
+  void learn(double part, bool has_closed)
   {
-    const bool is_right = tries == 1 || (has_closed && about.has_complete_factors());
+    const bool is_right = part == 1.0 || (has_closed && about.has_complete_factors());
     if (is_right) {
       shift /= DECAY;
-    } else if (tries > FAR_OFF) {
+    } else if (part < FAR_OFF) {
       shift *= GROWTH;
     }
   }
@@ -108,8 +108,8 @@ class NewtonSystem {
   /// Relative remainder of a unit vector after iterations that met no negative curvature.
   static constexpr double FALLING = 1e-3;
 
-  /// A step that needed more evaluations of the line search had a wrong direction.
-  static constexpr int FAR_OFF = 6;
+  /// A step of which the line search takes a smaller part had a wrong direction.
+  static constexpr double FAR_OFF = 0x1p-6;
 
   /// Iterations with complete factors of an earlier base that take less time than new ones, and the
   /// remainder of the solution over the accuracy of other iterations.

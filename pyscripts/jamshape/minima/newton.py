@@ -12,9 +12,9 @@ from jamshape.minima.nonsmooth import at_rest
 # L-BFGS, cheap while contacts open and close, hands over to Newton's method below this residual.
 _NEWTON_BELOW = 1e-2
 
-# Evaluations without a gain after which a minimisation has stalled: on a kink; or, if there is none, where rods or flat sides
-# slide, which lowers the energy by little up to the next contact.
-_PATIENCE, _LONG_PATIENCE = 500, 5000
+# Evaluations without a gain after which a minimisation has stalled, usually on a kink; and those with which one of this
+# tolerance goes on from there without a kink, where flat sides slide. On the way to an energy a stalled state suffices.
+_PATIENCE, _LONG_PATIENCE, _FINE = 500, 5000, 1e-6
 
 
 def auto(descent: Descent) -> Outcome:
@@ -37,7 +37,7 @@ def _descend(descent: Descent, newton_below: float, *, is_near: bool = False) ->
     outcome = descent.outcome()
     if outcome is None:
         outcome = _run(descent, newton_below, _PATIENCE, is_near=is_near)
-    if outcome is Outcome.STALLED:
+    if outcome is Outcome.STALLED and descent.stop.tolerance <= _FINE:
         outcome = _run(descent, math.inf, _LONG_PATIENCE)
     return outcome
 

@@ -97,28 +97,28 @@ def test_hessians_of_minima_keep_their_shift():
 def test_shift_falls_after_good_steps_and_rises_after_bad_ones():
     newton, _ = equations(pressed_named("discs"), 1e-3)
     first = newton.shift
-    newton.learn(1, has_closed=False)
+    newton.learn(1.0, has_closed=False)
     lower = newton.shift
     assert lower < first
-    newton.learn(3, has_closed=False)
+    newton.learn(0.3, has_closed=False)
     assert newton.shift == lower
-    newton.learn(20, has_closed=False)
+    newton.learn(1e-3, has_closed=False)
     assert newton.shift > first
 
 
 def test_steps_that_a_closing_contact_stops_raise_no_shift_of_complete_factors():
     newton, _ = equations(pressed_named("discs"), 1e-3)
     good, _ = equations(pressed_named("discs"), 1e-3)
-    newton.learn(20, has_closed=True)
-    good.learn(1, has_closed=False)
+    newton.learn(1e-3, has_closed=True)
+    good.learn(1.0, has_closed=False)
     assert newton.shift == good.shift
 
 
 def test_steps_that_a_closing_contact_stops_raise_the_shift_of_iterations():
     newton, _ = equations(packing_named(MANY), 1e-3)
     other, _ = equations(packing_named(MANY), 1e-3)
-    newton.learn(20, has_closed=True)
-    other.learn(20, has_closed=False)
+    newton.learn(1e-3, has_closed=True)
+    other.learn(1e-3, has_closed=False)
     assert newton.shift == other.shift > 1e-3
 
 
