@@ -9,14 +9,16 @@ standard output is one JSON object: the packing fraction of each packing, and th
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from PIL import Image
 
 import jamshape as js
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.saving import save_figure
+from jamshape.files.disk import replacing
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -24,7 +26,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 INCHES, DPI = 2.4, 150
-ARROW = 0.8  # longest arrow of the mode, in diameters of the smallest disc
+COLORS = 64  # of a palette
+ARROW = 2.0  # longest arrow of the mode, in diameters of the smallest disc
 
 
 def packings() -> dict[str, tuple[js.Packing, str]]:
@@ -36,25 +39,23 @@ def packings() -> dict[str, tuple[js.Packing, str]]:
     return {
         "rods": (made(js.Spherocylinders(alpha=4), 64), "orientation"),
         "superballs": (made(js.Superellipsoids(p=2.0), 150), "one"),
-        "bumpy": (made(js.Clumps(discs=js.bumpy_discs(8, depth=0.3)), 48), "kind"),
+        "bumpy": (made(js.Clumps(discs=js.bumpy_discs(8, depth=0.3)), 64), "kind"),
         "polygons": (
             made(js.Spheropolygons(corners=js.regular_polygon(5), rounding=0.15), 64),
-            "orientation",
+            "kind",
         ),
     }
 
 
 def draw_shear(axes: Axes) -> js.Packing:
     """Draw the stress of ellipses under quasistatic shear; returns the packing from which it starts."""
-    ellipses = js.Superellipsoids(w1=0.6, dimension=2)
-    start = js.make_packing(ellipses, n=48, seed=1, u0=1e-5, progress=False)
+    ellipses = js.Superellipsoids(w1=0.6)
+    start = js.make_packing(ellipses, n=48, dimension=2, seed=1, u0=1e-5, progress=False)
     sheared = js.quasistatic_shear(start=start, step=1e-3, strain=0.3, progress=False)
-    js.plot(sheared, axes)
-    if legend := axes.get_legend():
-        legend.remove()
-    axes.tick_params(labelsize=6)
-    axes.xaxis.label.set_size(8)
-    axes.yaxis.label.set_size(8)
+    axes.plot(sheared.strain, 1e4 * sheared.stress)
+    axes.set_xlabel(r"strain $\gamma$", fontsize=8)
+    axes.set_ylabel(r"stress $-p_{xy}$ [$10^{-4}\,k_e/a^2$]", fontsize=8)
+    axes.tick_params(labelsize=7)
     return start
 
 
@@ -71,20 +72,25 @@ def draw_mode(axes: Axes) -> float:
         patches.set_alpha(0.35)
     place = discs.box.lo + discs.box.wrapped(discs.position)[0]
     longest = np.linalg.norm(shift, axis=1).max() / (ARROW * 2 * discs.radius.min())
-    arrows = {"angles": "xy", "scale_units": "xy", "scale": longest, "width": 0.008, "zorder": 3}
+    arrows = {"angles": "xy", "scale_units": "xy", "scale": longest, "width": 0.009, "zorder": 3}
     axes.quiver(*place.T, *shift.T, **arrows)
     return float(modes.omega[softest])
 
 
 def save(figure: Figure, folder: Path, name: str) -> None:
     """Save a picture of the strip in few colours, so that the page loads fast."""
-    save_figure(figure, folder / f"front_{name}.png", dpi=DPI, pil_kwargs={"optimize": True})
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+    path = folder / f"front_{name}.png"
+    with replacing(path) as temporary:
+        picture.quantize(COLORS).save(temporary, format="PNG", optimize=True)
 
 
 def square(*, with_labels: bool = False) -> tuple[Figure, Axes]:
     """Return a figure of the strip and its axes, which fill it or leave space for labels."""
-    figure = Figure(figsize=(INCHES, INCHES))
-    place = (0.22, 0.18, 0.74, 0.78) if with_labels else (0.02, 0.02, 0.96, 0.96)
+    figure = Figure(figsize=(INCHES, INCHES), dpi=DPI)
+    place = (0.2, 0.17, 0.77, 0.8) if with_labels else (0.02, 0.02, 0.96, 0.96)
     return figure, figure.add_axes(place)
 
 
@@ -99,7 +105,6 @@ def main(options: Namespace) -> None:
         found[f"phi_{name}"] = packing.phi
     figure, axes = square(with_labels=True)
     found["phi_shear"] = draw_shear(axes).phi
-    axes.set_title("")
     save(figure, Path(options.out), "shear")
     figure, axes = square()
     found["omega_mode"] = draw_mode(axes)
