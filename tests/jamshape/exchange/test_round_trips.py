@@ -46,7 +46,7 @@ FORMATS = {
     "`.gsd`": by_file(".gsd"),
     "`.data`": by_file(".data"),
     "`.dump`": by_file(".dump"),
-    "living LAMMPS": living,
+    "running LAMMPS": living,
 }
 
 
