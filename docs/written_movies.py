@@ -1,0 +1,22 @@
+"""Show the movies that a script of the gallery writes on its page, as Sphinx-Gallery shows figures."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+from sphinx_gallery.scrapers import figure_rst
+
+
+def scrape(block: Any, variables: dict[str, Any], settings: dict[str, Any]) -> str:
+    """Move new movies beside the figures of the page; return the reStructuredText that shows them."""
+    del block
+    movies = sorted(Path(variables["src_file"]).parent.glob("*.gif"))
+    shown = [
+        Path(place).with_suffix(".gif")
+        for _, place in zip(movies, variables["image_path_iterator"], strict=False)
+    ]
+    for movie, place in zip(movies, shown, strict=True):
+        shutil.move(movie, place)
+    return figure_rst([str(place) for place in shown], settings["src_dir"])
