@@ -3,10 +3,8 @@ Nonaffine displacements
 =======================
 
 Where particles go beside the affine motion of the box, between two states of a quasistatic shear: arrows are 20 times
-the displacements, and thick where the surroundings of a particle deform least affinely (large D2_min).
+the displacements, and dark where the surroundings of a particle deform least affinely (large D2_min).
 """
-
-import numpy as np
 
 import jamshape as js
 
@@ -17,15 +15,5 @@ moves = js.nonaffine(packing, run.packing())
 print(moves)
 axes = js.plot(packing, color="one")
 x, y = (packing.box.wrapped(packing.position)[0] + packing.box.lo).T
-width = 0.006 * np.sqrt(moves.D2_min / moves.D2_min.max())
-axes.quiver(
-    x,
-    y,
-    *(20 * moves.displacement.T),
-    moves.D2_min,
-    cmap="inferno_r",
-    angles="xy",
-    scale_units="xy",
-    scale=1,
-    zorder=10,
-)
+arrows = {"angles": "xy", "scale_units": "xy", "scale": 1, "cmap": "inferno_r", "zorder": 10}
+axes.quiver(x, y, *(20 * moves.displacement.T), moves.D2_min, **arrows)
