@@ -37,17 +37,19 @@ nb_execution_raise_on_error = True
 nb_execution_show_tb = True
 nb_merge_streams = True
 
-# Scripts are run in a copy, for the files that they write; ./run docs makes it anew each time. Their pages, pictures and
-# checksums stay in the copy of the pages from which Sphinx reads, so that only scripts that changed are run again.
-sys.path.insert(0, str(DOCS))  # for written_movies
+# ./run docs copies the pages to build/pages/docs, from where Sphinx reads them, and the scripts of the gallery beside it,
+# where they are run. Their pages, pictures and checksums stay, so that only scripts that changed are run again.
+sys.path.insert(0, str(DOCS))  # for gallery_pictures
+SCRIPTS = ROOT / "build" / "pages" / "scripts"
 SECTIONS = ("shapes", "packings", "shear", "modes", "programs")
 sphinx_gallery_conf = {
-    "examples_dirs": str(ROOT / "build" / "docs-scripts"),
+    "examples_dirs": str(SCRIPTS),
     "gallery_dirs": "gallery",
     "filename_pattern": r"\.py$",
-    "subsection_order": [str(ROOT / "build" / "docs-scripts" / name) for name in SECTIONS],
+    "subsection_order": [f"../{SCRIPTS.name}/{name}" for name in SECTIONS],
     "within_subsection_order": "FileNameSortKey",
-    "image_scrapers": ("matplotlib", "written_movies.scrape"),
+    "image_scrapers": ("matplotlib", "gallery_pictures.show_movies"),
+    "reset_modules": ("matplotlib", "gallery_pictures.keep_margins"),
     "image_srcset": ["2x"],
     "capture_repr": (),
     "notebook_extensions": set(),  # MyST-NB would read them as pages

@@ -1,4 +1,4 @@
-"""Show the movies that a script of the gallery writes on its page, as Sphinx-Gallery shows figures."""
+"""Settings of Sphinx-Gallery that are functions: movies on pages, and figures with room for their legends."""
 
 from __future__ import annotations
 
@@ -6,10 +6,17 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 from sphinx_gallery.scrapers import figure_rst
 
 
-def scrape(block: Any, variables: dict[str, Any], settings: dict[str, Any]) -> str:
+def keep_margins(settings: dict[str, Any], script: str | None) -> None:
+    """Save figures with all that is drawn beside their axes, after a reset of matplotlib."""
+    del settings, script
+    mpl.rcParams["savefig.bbox"] = "tight"
+
+
+def show_movies(block: Any, variables: dict[str, Any], settings: dict[str, Any]) -> str:
     """Move new movies beside the figures of the page; return the reStructuredText that shows them."""
     del block
     movies = sorted(Path(variables["src_file"]).parent.glob("*.gif"))
