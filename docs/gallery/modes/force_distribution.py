@@ -18,6 +18,6 @@ figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4.8), layout="constrained
 js.plot(packing, left, color="one")
 points = packing.box.wrapped(bonds.point)[0] + packing.box.lo
 for point, normal, f in zip(points, bonds.normal, force, strict=True):
-    left.plot(*(point + np.outer([-0.5, 0.5], normal)).T, "r-", lw=2 * f, solid_capstyle="round")
+    left.plot(*(point + np.outer([-0.5, 0.5], normal)).T, "k-", lw=2 * f, solid_capstyle="round")
 right.hist(force, bins=30, density=True)
-right.set(xlabel="force over its mean", ylabel="probability density", yscale="log")
+right.set(xlabel="force over its mean", ylabel="probability density")

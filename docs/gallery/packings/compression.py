@@ -9,7 +9,7 @@ the packing fraction at which frames of the run stay jammed when they are minimi
 import jamshape as js
 
 rods = js.Spherocylinders(alpha=2)
-run = js.compress(rods, n=64, phi=(0.6, 0.92), kappa=3e-5, file="run.h5", progress=False)
+run = js.compress(rods, n=64, phi=(0.6, 0.9), kappa=3e-5, frames=60, file="run.h5", progress=False)
 jamming = run.jamming(progress=False)
 print(
     f"phi_J(kappa) = {run.onset().phi_J:.4f}; frames jam between {jamming.unjams:.4f} and {jamming.jams:.4f}"

@@ -25,5 +25,6 @@ run           3800
 write_data    rods.data
 """)
 folder = str(decks_path().parent)  # as jamshape plugin --folder prints it
-subprocess.run(["lmp", "-in", "rods.in", "-var", "jamshape", folder], check=True)
+lmp = ["lmp", "-in", "rods.in", "-var", "jamshape", folder]
+subprocess.run(lmp, check=True, capture_output=True)
 js.plot(js.load("rods.data"), color="orientation")

@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import jamshape as js
 
 discs = js.Spherocylinders(alpha=0)
-js.compress(discs, n=100, phi=(0.7, 0.9), kappa=1e-4, file="discs.h5", progress=False)
+js.compress(discs, n=100, phi=(0.5, 0.9), kappa=1e-4, file="discs.h5", progress=False)
 rdf = freud.density.RDF(bins=100, r_max=4)
 for packing in js.frames("discs.h5")[-8:]:
     rdf.compute(system=packing.to_freud().system, reset=False)

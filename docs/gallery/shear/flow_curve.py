@@ -11,10 +11,10 @@ import jamshape as js
 
 discs = js.Spherocylinders(alpha=0)
 figure, axes = plt.subplots(figsize=(5, 3.6), layout="constrained")
-for phi in (0.78, 0.88):
+for phi in (0.78, 0.95):
     sigma = []
     for gdot in (1e-4, 1e-3, 1e-2):
-        run = js.shear(discs, n=32, phi=phi, gdot=gdot, strain=3, progress=False)
+        run = js.shear(discs, n=32, phi=phi, gdot=gdot, strain=2, progress=False)
         sigma.append(run.steady()["sigma"])
     axes.errorbar(
         [1e-4, 1e-3, 1e-2],

@@ -3,7 +3,7 @@ Nonaffine displacements
 =======================
 
 Where particles go beside the affine motion of the box, between two states of a quasistatic shear: arrows are 20 times
-the displacements, and dark where the surroundings of a particle deform least affinely (large D2_min).
+the displacements. Circles mark the five particles with the largest D2_min, whose neighbours deform least affinely.
 """
 
 import jamshape as js
@@ -15,5 +15,6 @@ moves = js.nonaffine(packing, run.packing())
 print(moves)
 axes = js.plot(packing, color="one")
 x, y = (packing.box.wrapped(packing.position)[0] + packing.box.lo).T
-arrows = {"angles": "xy", "scale_units": "xy", "scale": 1, "cmap": "inferno_r", "zorder": 10}
-axes.quiver(x, y, *(20 * moves.displacement.T), moves.D2_min, **arrows)
+axes.quiver(x, y, *(20 * moves.displacement.T), angles="xy", scale_units="xy", scale=1, zorder=10)
+most = moves.D2_min.argsort()[-5:]
+axes.plot(x[most], y[most], "o", ms=26, mfc="none", mec="k", mew=2)
