@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ project_copyright = "the jamshape developers"
 version = release = jamshape.__version__
 language = "en"
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_gallery.gen_gallery"]
 myst_enable_extensions = ["deflist", "dollarmath"]
 myst_heading_anchors = 4
 # Examples are run when the site is built, so that every output is a real one; an error in one ends the build.
@@ -35,6 +36,28 @@ nb_execution_timeout = 300
 nb_execution_raise_on_error = True
 nb_execution_show_tb = True
 nb_merge_streams = True
+
+# ./run docs copies the pages to build/pages/docs, from where Sphinx reads them, and the scripts of the gallery beside it,
+# where they are run. Their pages, pictures and checksums stay, so that only scripts that changed are run again.
+sys.path.insert(0, str(DOCS))  # for gallery_pictures
+SCRIPTS = ROOT / "build" / "pages" / "scripts"
+SECTIONS = ("shapes", "packings", "shear", "modes", "programs")
+sphinx_gallery_conf = {
+    "examples_dirs": str(SCRIPTS),
+    "gallery_dirs": "gallery",
+    "filename_pattern": r"\.py$",
+    "subsection_order": [f"../{SCRIPTS.name}/{name}" for name in SECTIONS],
+    "within_subsection_order": "FileNameSortKey",
+    "image_scrapers": ("matplotlib", "gallery_pictures.show_movies"),
+    "reset_modules": ("matplotlib", "gallery_pictures.keep_margins"),
+    "image_srcset": ["2x"],
+    "capture_repr": (),
+    "notebook_extensions": set(),  # MyST-NB would read them as pages
+    "download_all_examples": False,
+    "show_signature": False,
+    "write_computation_times": False,
+    "abort_on_example_error": True,
+}
 
 autodoc_typehints = "none"  # the docstrings have them, with shapes and units
 autodoc_member_order = "bysource"
@@ -81,6 +104,9 @@ def _led(link: re.Match[str], folder: Path, name: str) -> str:
     if found == ROOT / "README.md":
         found = DOCS / "index.md"
     if DOCS in found.parents and found.is_file():
+        if DOCS / "gallery" in found.parents:  # a script, or the header of a section
+            name_of_page = found.stem if found.suffix == ".py" else "index"
+            found = found.with_name(f"{name_of_page}.rst")
         return f"[{text}]({os.path.relpath(found, (DOCS / name).parent)}{anchor})"
     return text
 

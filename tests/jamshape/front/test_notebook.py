@@ -8,7 +8,7 @@ nbformat = pytest.importorskip("nbformat")
 nbclient = pytest.importorskip("nbclient")
 pytest.importorskip("ipykernel")
 
-NOTEBOOK = Path(__file__).parents[3] / "docs" / "tutorial" / "first_packing.ipynb"
+NOTEBOOK = Path(__file__).parents[3] / "docs" / "course" / "first_packing.ipynb"
 
 
 @pytest.fixture(scope="module")
