@@ -104,7 +104,7 @@ def add_old_flag(parser: ArgumentParser, old: str, instead: str) -> None:
     old : str
         Such as ``--resume``.
     instead : str
-        What holds without it, for the warning.
+        Present behaviour without it, for the warning.
     """
     parser.add_argument(
         old, action=_OldFlag, nargs=0, default=False, help=SUPPRESS, metavar=instead

@@ -659,7 +659,7 @@ class LadderFile(Recorded):
     ) -> list[ContactChange]:
         """List the contacts that opened and closed from one state to the next.
 
-        Contacts of rattlers are included. Images of a pair are counted, not told apart.
+        Contacts of rattlers are included. Images of a pair are counted, not distinguished.
 
         Parameters
         ----------

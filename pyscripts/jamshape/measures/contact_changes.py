@@ -57,7 +57,7 @@ class At(Record):
     def bonds(self) -> set[Bond]:
         """All bonds between particles, those of rattlers included.
 
-        Images of a pair are counted, not told apart: the vectors of a sheared box change.
+        Images of a pair are counted, not distinguished: the vectors of a sheared box change.
         """
         network = find_contacts(self.packing)
         count: Counter[tuple[int, int]] = Counter()

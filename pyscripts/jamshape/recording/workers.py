@@ -191,7 +191,7 @@ def _receive(pipe: IO[bytes], tasks: queue.SimpleQueue[Any]) -> None:
 
 
 def _answer(module: str, function: str, arguments: tuple[Any, ...]) -> tuple[Any, Any]:
-    """Return a result, and why there is none: a text, or an error that nobody expects."""
+    """Return a result, and why there is none: a text, or an unexpected error."""
     try:
         return getattr(importlib.import_module(module), function)(*arguments), None
     except PROBLEMS as error:
