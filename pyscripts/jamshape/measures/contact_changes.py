@@ -39,7 +39,7 @@ class ContactChange(NamedTuple):
     ids: tuple[int, int]
     """IDs of the two particles, ascending; equal for a particle and its own periodic image."""
     bond: int
-    """Number of the bond between the two, from 1: 2 is the second bond of a side-to-side contact, or another image."""
+    """Number of the bond between the two, from 1; 2 is the second bond of a side-to-side contact, or another image."""
     change: str
     """"opened" or "closed"."""
     returns: bool | None = None

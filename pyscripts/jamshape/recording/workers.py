@@ -34,7 +34,7 @@ class Done(NamedTuple):
     """Place in the list of tasks."""
     result: Any = None
     failure: str | None = None
-    """Reason for which there is no result: the message of an expected error, or the end of the process."""
+    """Reason for which there is no result, the message of an expected error, or the end of the process."""
 
 
 PROBLEMS = (OSError, ValueError, RuntimeError, ImportError)

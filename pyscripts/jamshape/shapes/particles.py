@@ -100,7 +100,7 @@ class Particles:
 
     @property
     def identity(self) -> dict[str, Any]:
-        """Return `told` with all that identifies the particles in a file: None for a law that is not to be there."""
+        """Return `told` with all that identifies the particles in a file; None for a law that is not to be there."""
         return {"law": None} | dict(self.told)
 
     def under(self, law: str | float) -> Particles:

@@ -28,7 +28,7 @@ class Quotients(NamedTuple):
     value: LongArray
     """(k,)"""
     residual: FloatArray
-    """(k,) norms of M v - value v for |v| = 1: an eigenvalue lies within this distance."""
+    """(k,) norms of M v - value v for |v| = 1; an eigenvalue lies within this distance."""
     rounding: FloatArray
     """(k,) rounding error of the value itself."""
     entries: FloatArray
