@@ -80,8 +80,10 @@ def add_old_option(parser: ArgumentParser, old: str, new: str, **keywords: Any) 
     Parameters
     ----------
     parser
-    old, new : str
-        Such as ``--way`` and ``--protocol``.
+    old : str
+        Such as ``--way``.
+    new : str
+        Such as ``--protocol``.
     **keywords
         As of the new option: `type`, `choices`.
     """

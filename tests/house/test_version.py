@@ -34,7 +34,13 @@ def test_the_paper_has_the_title_and_authors_of_the_citation():
 def test_the_paper_keeps_to_the_format_of_joss():
     head, body = PAPER.split("---\n", 2)[1:]
     headings = re.findall(r"^# (.+)$", body, re.MULTILINE)
-    wanted = ["Summary", "Statement of need", "State of the field", "Software design", "Research impact statement"]
+    wanted = [
+        "Summary",
+        "Statement of need",
+        "State of the field",
+        "Software design",
+        "Research impact statement",
+    ]
     assert headings == [*wanted, "AI usage disclosure", "Acknowledgements", "References"]
     assert 750 <= len(body.split()) <= 1750
     assert "bibliography: paper.bib" in head

@@ -6,7 +6,7 @@ import re
 import tokenize
 
 import pytest
-from test_house import PLUGIN, ROOT, SHARED, docstrings, python_files, tree_of
+from test_house import LIBRARY, PLUGIN, ROOT, SHARED, docstrings, python_files, tree_of
 
 # A docstring says what is returned or done; these begin half a sentence, or stand for a standard verb.
 NO_FIRST_WORD = re.compile(
@@ -79,7 +79,9 @@ def pages():
     """Pages and notebooks of the site and those beside the code; CHANGELOG.md quotes earlier words."""
     beside = [page for page in ROOT.glob("*.md") if page.name != "CHANGELOG.md"]
     folders = [ROOT / name for name in ("analysis", "docs", "inputs", "lammps_plugin")]
-    return sorted(beside) + sorted(p for f in folders for s in ("*.md", "*.ipynb") for p in f.rglob(s))
+    return sorted(beside) + sorted(
+        p for f in folders for s in ("*.md", "*.ipynb") for p in f.rglob(s)
+    )
 
 
 def spelled_wrong(texts):
@@ -102,7 +104,48 @@ def test_no_phrase_of_a_page_is_private_dialect(page):
 
 
 def test_phrases_are_found():
-    said = ["is led to u0", "the outcome `corner`", "may be told apart", "rods go on", "if they are none"]
+    said = [
+        "is led to u0",
+        "the outcome `corner`",
+        "may be told apart",
+        "rods go on",
+        "if they are none",
+    ]
     assert all(map(NO_PHRASES.search, said))
-    idiomatic = ["The flow leads to order.", "outcome `corner` for `kink`", "It is none of these.", "at rest"]
+    idiomatic = [
+        "The flow leads to order.",
+        "outcome `corner` for `kink`",
+        "It is none of these.",
+        "at rest",
+    ]
     assert not any(map(NO_PHRASES.search, idiomatic))
+
+
+def fields_and_properties(path):
+    """Yield names of fields and properties of public classes, and the first lines of their docs."""
+    tree = tree_of(path)
+    for owner in (n for n in ast.walk(tree) if isinstance(n, ast.ClassDef) and n.name[0] != "_"):
+        for before, node in zip([None, *owner.body], owner.body, strict=False):
+            if isinstance(node, ast.FunctionDef) and any(
+                "property" in ast.unparse(d) for d in node.decorator_list
+            ):
+                yield (
+                    f"{owner.name}.{node.name}",
+                    (ast.get_docstring(node) or "").partition("\n")[0],
+                )
+            is_text = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+            if is_text and isinstance(before, ast.AnnAssign):
+                yield (
+                    f"{owner.name}.{before.target.id}",
+                    node.value.value.strip().partition("\n")[0],
+                )
+
+
+def test_docs_of_fields_have_no_colon_that_sphinx_takes_for_the_end_of_a_type():
+    docs = {
+        name: text for path in python_files(LIBRARY) for name, text in fields_and_properties(path)
+    }
+    assert len(docs) > 300
+    assert [
+        n for n, text in docs.items() if re.search(r":(?!\S)", re.sub(r"`+.*?`+", "", text))
+    ] == []

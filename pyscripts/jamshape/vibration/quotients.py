@@ -95,8 +95,10 @@ def isolated_error(values: FloatArray, residual: FloatArray) -> FloatArray:
 
     Parameters
     ----------
-    values, residual : (k,) array of float64
-        Rayleigh quotients, and norms of M v - value v.
+    values : (k,) array of float64
+        Rayleigh quotients.
+    residual : (k,) array of float64
+        Norms of M v - value v.
 
     Returns
     -------
