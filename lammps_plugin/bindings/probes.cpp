@@ -331,7 +331,7 @@ std::vector<Ball> discs_in(const Array2<double> &rows, int dimension)
   require(dimension == 2 || dimension == 3,
           "dimension is " + std::to_string(dimension) + ", expected 2 or 3.");
   const auto discs = read_discs({rows.data(), rows.data() + rows.size()}, dimension);
-  require(discs.has_value(), "discs hold a row that is no disc, expected x y z r of 1 to " +
+  require(discs.has_value(), "discs hold a row that is not a disc, expected x y z r of 1 to " +
                                  std::to_string(MOST_DISCS) +
                                  " of them with positive radii, in 2D with z = 0.");
   return *discs;
@@ -357,7 +357,7 @@ nb::object polygon_moments(double rounding, const Array2<double> &corners)
   FormNumbers numbers{rounding};
   numbers.insert(numbers.end(), corners.data(), corners.data() + corners.size());
   const auto polygon = read_polygon(numbers);
-  require(polygon.has_value(), "corners are no convex polygon, expected 1 to " +
+  require(polygon.has_value(), "corners do not form a convex polygon, expected 1 to " +
                                    std::to_string(MOST_CORNERS) +
                                    " corners, counter-clockwise, and a positive rounding radius.");
   return as_array(polygon->moments());

@@ -81,7 +81,8 @@ template <int BLOCK> class IteratedFactors : public Factors {
   }
 
  private:
-  /// Relative residual, in the norm of the preconditioner: Newton's method corrects what it leaves.
+  /// Relative residual, in the norm of the preconditioner: Newton's method corrects the remaining
+  /// error.
   static constexpr double REMAINDER = 1e-5;
 
   std::shared_ptr<const BlockPattern> pattern;

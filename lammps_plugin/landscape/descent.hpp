@@ -171,8 +171,8 @@ class Descent {
   static constexpr double COARSE = 0.1;
 
   static constexpr int TRIES = 25;
-  /// Where closing contacts stop steps, one step resembles the last: a line search begins at this
-  /// multiple of its part, and grows by it while the force has not fallen.
+  /// A line search begins at this multiple of the fraction of the last step, since closing contacts
+  /// stop successive steps alike, and grows by it while the force has not fallen.
   static constexpr double WIDER = 10.0;
   static constexpr double TELL_SECONDS = 0.2;
 
@@ -206,7 +206,7 @@ class Descent {
   std::int64_t evaluations = 0;
   double least_energy = INFINITY, least_residual = INFINITY;
   std::size_t most_bonds = 0;  // since the energy or the residual gained
-  double reach = 1.0;          // first part of a Newton step that a line search tries
+  double reach = 1.0;          // first fraction of a Newton step that a line search tries
   std::int64_t best = 0;       // when the present method gained
   std::int64_t last_gain = 0;  // when any method gained
   bool extended = false;

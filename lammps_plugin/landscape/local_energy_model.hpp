@@ -743,7 +743,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     return scaled + std::sqrt(sheared_sq);
   }
 
-  /// Whether the gap of two surfaces may have shrunk by the skin, or by what remains of it.
+  /// Whether the gap of two surfaces may have shrunk by the skin, or by its remainder.
   bool is_beyond(const NearPairs &list, const Displacement &at, double kept = 0.0) const
   {
     double most = 0.0, most_sq = 0.0;

@@ -311,7 +311,7 @@ class StageSolver {
     return found;
   }
 
-  /// With the pull onto the kinks: what Newton's step makes zero.
+  /// Residual of Newton's step, with the pull onto the kinks.
   Vector pushed(const Point &at) const
   {
     Vector found = slope(at);

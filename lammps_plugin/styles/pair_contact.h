@@ -146,7 +146,7 @@ class PairContact : public LAMMPS_NS::Pair {
 
   /// The numbers of a type beside its size, as they follow the energy in 'pair_coeff I I'.
   const FormNumbers &form(int type) const { return form_of[type]; }
-  /// Takes the numbers of a type; returns false, with everything as before, if they are none.
+  /// Takes the numbers of a type; returns false, and changes nothing, if they are invalid.
   virtual bool take_form(int type, const FormNumbers &numbers) = 0;
   /// Name of these numbers, empty for shapes without, and a description of the required ones.
   virtual std::string form_name() const = 0;

@@ -452,8 +452,10 @@ def require_one_process(why: str = "", instead: str = "") -> None:
 
     Parameters
     ----------
-    why, instead : str
-        Other reason, and other advice.
+    why : str
+        Other reason.
+    instead : str
+        Other advice.
 
     Raises
     ------

@@ -80,8 +80,10 @@ def add_old_option(parser: ArgumentParser, old: str, new: str, **keywords: Any) 
     Parameters
     ----------
     parser
-    old, new : str
-        Such as ``--way`` and ``--protocol``.
+    old : str
+        Such as ``--way``.
+    new : str
+        Such as ``--protocol``.
     **keywords
         As of the new option: `type`, `choices`.
     """
@@ -104,7 +106,7 @@ def add_old_flag(parser: ArgumentParser, old: str, instead: str) -> None:
     old : str
         Such as ``--resume``.
     instead : str
-        What holds without it, for the warning.
+        Present behaviour without it, for the warning.
     """
     parser.add_argument(
         old, action=_OldFlag, nargs=0, default=False, help=SUPPRESS, metavar=instead

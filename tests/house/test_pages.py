@@ -1,10 +1,16 @@
 """Every link of a page leads somewhere, and every file that a page names is there."""
 
+import csv
 import re
 import tomllib
 from pathlib import Path
 
 import pytest
+
+import jamshape
+from jamshape.flow.cyclic_shear import CyclicShear
+from jamshape.flow.quasistatic import Row
+from jamshape.vibration.table import BANDS, COLUMNS
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("docs", "analysis", "inputs", "lammps_plugin", "pyscripts", "tests")
@@ -64,3 +70,30 @@ def test_names_on_the_way_of_a_particle_are_in_the_code():
     names = set(re.findall(r"[A-Za-z_]\w{2,}", re.sub(r'"[^"]*"', "", spans)))
     code = " ".join(p.read_text(encoding="utf-8") for glob in SOURCES for p in ROOT.glob(glob))
     assert names - set(re.findall(r"\w+", code)) == set()
+
+
+REFERENCE = ROOT / "docs" / "reference"
+
+
+def test_every_public_name_has_an_entry_in_the_reference():
+    text = (REFERENCE / "python.md").read_text(encoding="utf-8")
+    entries = set(re.findall(r"auto(?:class|function):: jamshape\.(\w+)$", text, re.MULTILINE))
+    assert set(jamshape.__all__) - entries == set()
+
+
+def table_columns():
+    """List the columns of the CSV tables of results."""
+    for path in (ROOT / "docs" / "results" / "tables").rglob("*.csv"):
+        with path.open(newline="", encoding="utf-8") as file:
+            yield from next(csv.reader(file))
+
+
+def test_every_column_is_defined():
+    pages = (REFERENCE / "columns.md", ROOT / "docs" / "explanation" / "files.md")
+    defined = set(
+        re.findall(r"`(\w+)`", "".join(page.read_text(encoding="utf-8") for page in pages))
+    )
+    runs = {*CyclicShear.of_packing, *CyclicShear.of_fix, *Row._fields}
+    assert {*runs, *table_columns()} - {"step", *BANDS.values()} - defined == set()
+    assert set(COLUMNS) - defined == set()
+    assert all(f"{code}: " in pages[0].read_text(encoding="utf-8") for code in BANDS)

@@ -46,7 +46,7 @@ struct Discs {
 /// Discs per body that a search may take.
 inline constexpr std::size_t MOST_DISCS = 255;
 
-/// Reads rows x y z r of discs, with z = 0 in 2D; nothing if they are none. Rows of zeros at the
+/// Reads rows x y z r of discs, with z = 0 in 2D; nothing for other rows. Rows of zeros at the
 /// end fill up arrays.
 inline std::optional<std::vector<Ball>> read_discs(const FormNumbers &numbers, int dimension)
 {

@@ -93,7 +93,7 @@ template <int D, class S> ContactKind kind_of(const SpinePair<D, S> &p, const Fe
 /// norm becomes E(a). So E(a) <= V <= 2 E(a), without the jumps of the paper's rule, and the same
 /// with the two ends exchanged.
 ///
-/// Force and torques are its exact derivatives. What is left are kinks: where the nearer tip of the
+/// Force and torques are its exact derivatives. The remaining kinks are where the nearer tip of the
 /// far end changes, of relative size of the angle between the rods; and in 3D, for twisted rods, of
 /// full strength. Exactly parallel rods with Sides::ONE sit on a kink: the lever arm is the middle
 /// of the overlap of the spines, which lies between both sides' and is the same for i, j exchanged.

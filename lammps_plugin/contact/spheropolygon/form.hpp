@@ -108,7 +108,7 @@ struct RoundedPolygon {
 /// Corners that a body may have.
 inline constexpr std::size_t MOST_CORNERS = 255;
 
-/// Reads a rounding radius and corners x y; nothing if they are none, or not convex and
+/// Reads a rounding radius and corners x y; nothing for other numbers, or corners not convex and
 /// counter-clockwise. Corners 0 0 at the end fill up arrays.
 inline std::optional<RoundedPolygon> read_polygon(const FormNumbers &numbers)
 {

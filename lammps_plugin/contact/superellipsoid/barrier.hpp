@@ -163,7 +163,7 @@ template <int D, class T, bool NESTED> class ConeBarrier {
       return most * pow(sum, alpha);
     }
 
-    /// Divides what is left of t into `parts`, one for each u.
+    /// Divides the remainder of t into `parts`, one for each u.
     template <int K, class Components>
     static void share_of(const Components &x, T alpha, T t, int parts, T *u)
     {

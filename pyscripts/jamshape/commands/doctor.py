@@ -2,8 +2,8 @@
 
     jamshape doctor
 
-Looks for the compiled modules, LAMMPS with the plugin, MPI, and the programs that some commands use. Each line tells what was found
-and, if it is missing, what it is needed for and how to install it. The last line of standard output is one JSON object for reports of errors; the
+Looks for the compiled modules, LAMMPS with the plugin, MPI, and the programs that some commands use. Each line reports
+one of these and, if it is missing, its purpose and how to install it. The last line of standard output is one JSON object for reports of errors; the
 exit code is 0 if packings can be made and LAMMPS loads the plugin.
 """
 
@@ -66,7 +66,7 @@ def main(_: Namespace) -> int:
         mark = "ok" if part.version else "--" if not part.is_needed else "NO"
         print(f"{mark}  {part.name:{width}}  {part.version or part.advice}")
     works = all(part.version for part in parts if part.is_needed)
-    print("\nAll that is needed works." if works else "\nLines with NO tell what to do.")
+    print("\nAll that is needed works." if works else "\nLines with NO give the remedy.")
     report({"works": works} | {part.name: part.version for part in parts})
     return 0 if works else 1
 

@@ -87,7 +87,7 @@ def convert(path: Path, out: Path) -> Converted | None:
     Raises
     ------
     FileFormatError
-        If it is no file of jamshape, damaged, or of a later version.
+        If it is not a file of jamshape, damaged, or of a later version.
     ImportError
         If it is a GSD file, and gsd is not installed.
     OSError

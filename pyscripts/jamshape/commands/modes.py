@@ -5,7 +5,7 @@
 Eigenvalues of the dynamical matrix with signs and error bounds, bands and their counts, participation,
 kinds of motion, elastic moduli and stability to shear, to HDF5 (see jamshape.vibration.table). PACKING is any file with particles at rest: of
 `jamshape pack` or `jamshape minimise`, a LAMMPS dump or data file, GSD. Needs no LAMMPS, and
-cannot be put down on the way. The last line of standard output is one JSON object.
+cannot be interrupted and resumed. The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ class _Option(NamedTuple):
 
     @property
     def flag(self) -> str:
-        """Its name on the command line: that of a position if there is no default."""
+        """Its name on the command line; that of a position if there is no default."""
         return self.dest if self.usual is inspect.Parameter.empty else _flag(self.dest)
 
 

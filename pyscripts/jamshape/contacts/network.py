@@ -45,8 +45,10 @@ class Bonds:
         On particle i.
     point : (B, D) array of float64, [length]
         Point of interpenetration of the surfaces, next to the position of i as given in the packing.
-    distance, reach : (B,) array of float64, [length]
-        r and d of the overlap 1 - r/d: R_i + R_j, or lengths that make it 1 - eta^2.
+    distance : (B,) array of float64, [length]
+        r of the overlap 1 - r/d.
+    reach : (B,) array of float64, [length]
+        d of the overlap 1 - r/d: R_i + R_j, or the length that makes the overlap 1 - eta^2.
     energy : (B,) array of float64, [energy]
     on_side : (B, 2) array of bool
         Whether the point lies on the flat part of i, of j.
@@ -109,7 +111,10 @@ class ContactNetwork:
     energy : (M,) array of float64, [energy]
     force : (M, D) array of float64, [energy / length]
         On i; j carries the opposite.
-    torque_i, torque_j : (M,) array in 2D, (M, 3) in 3D, of float64, [energy]
+    torque_i : (M,) array in 2D, (M, 3) in 3D, of float64, [energy]
+        On i, about its centre.
+    torque_j : (M,) array in 2D, (M, 3) in 3D, of float64, [energy]
+        On j, about its centre.
     bonds : Bonds
     bonds_are_contacts : bool
         Whether each bond counts as a contact of its own for stability: for particles made of

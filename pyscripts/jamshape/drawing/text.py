@@ -98,7 +98,7 @@ def system_text(system: System) -> str:
 
 
 def mixture_text(system: System) -> str:
-    """Describe the kinds of a mixture, as far as known, by parameters, size and share."""
+    """Describe the kinds of a mixture by their known parameters, size and share."""
     shape = shape_named(system.shape)
     try:
         kinds = [parse_kind(text) for text in system.kinds.split(";")]

@@ -28,7 +28,7 @@ class FreudSystem(NamedTuple):
 
     @property
     def system(self) -> tuple[Any, FloatArray]:
-        """Box and points: the first argument of most of freud's `compute`."""
+        """Box and points, the first argument of most of freud's `compute`."""
         return self.box, self.points
 
 

@@ -76,7 +76,7 @@ class Content:
     report
         Convergence history: step, wall seconds, error.
     checkpoint
-        From which an unfinished run goes on; None for a finished one, and for a checkpoint of another version.
+        From which an unfinished run is resumed; None for a finished one, and for a checkpoint of another version.
     """
 
     path: Path
@@ -178,6 +178,6 @@ def _require_after(name: str, last: int, step: int) -> None:
 
 
 def add_attributes(path: PathLike, found: Mapping[str, Any]) -> None:
-    """Add results to a file that nobody else writes; errors as `jamshape.files.h5md.write_packing`."""
+    """Add results to a file without other writers; errors as `jamshape.files.h5md.write_packing`."""
     with layout.changed(path, path) as file:
         set_attributes(file["parameters"], found)

@@ -87,7 +87,7 @@ def _marks(file: IO[bytes]) -> Iterator[tuple[int, bytes, bytes]]:
 
 
 def _number(text: bytes) -> float:
-    """Read a number; 0 for what is none, as the reader of its frame will say."""
+    """Read a number; 0 for any other text, which the reader of its frame reports."""
     try:
         return float(text) if b"." in text or b"e" in text else int(text)
     except ValueError:

@@ -111,8 +111,10 @@ def number(attributes: Mapping[str, Any], name: str, who: str, expected: str) ->
     ----------
     attributes : mapping
     name : str
-    who, expected : str
-        Begin and end of the error message.
+    who : str
+        Begin of the error message.
+    expected : str
+        End of the error message.
 
     Raises
     ------

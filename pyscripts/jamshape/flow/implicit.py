@@ -228,7 +228,7 @@ class Flow:
     acceleration: FloatArray = field(default_factory=lambda: np.empty(0))
     time: float = 0.0
     strain: float = 0.0
-    """Strain of the box since the start: -ln L / L_0 of compression."""
+    """Strain of the box since the start, -ln L / L_0 in compression."""
     turned: float = 0.0
     """Mean rotation angle of particles since the start, in space about z."""
     steps: int = 0
@@ -580,7 +580,7 @@ class ImplicitFlow:
 
     @property
     def _stable(self) -> float:
-        """Estimate the longest explicit step, [time]: drag over stiffness of a contact or two."""
+        """Estimate the longest explicit step, [time], drag over stiffness of a contact or two."""
         longest = self._least_drag * self.size**2 / self.landscape.stiffness
         return _EXPLICIT_BELOW * (min(longest, self.box.longest_explicit) if self.box else longest)
 

@@ -32,7 +32,7 @@ _ROW = (
     "explicit",
 )
 
-# What the continuation depends on, beside the state.
+# A continuation depends on these, beside the state.
 _COUNTS = ("dt", "time", "strain", "turned", "steps", "rejected", "explicit", "evaluations", "factorisations",
            "wall_seconds", "explicit_left", "held", "extrapolates", "velocity", "acceleration")  # fmt: skip
 

@@ -87,7 +87,7 @@ class LammpsDriver:
     settings : Motion
     sizes : Sizes
     checkpoint : Checkpoint, optional
-        From which to go on.
+        Checkpoint to resume from.
     """
 
     def __init__(
@@ -117,7 +117,7 @@ class LammpsDriver:
         return self._is_over or self._session.step >= self._run.last_step
 
     def first(self) -> Row:
-        """Measure the state from which the run begins or goes on."""
+        """Measure the state from which the run begins or resumes."""
         return self._row(self._run.sample())
 
     def advance(self) -> Row:

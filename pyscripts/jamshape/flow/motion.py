@@ -239,7 +239,7 @@ class FlowRun(Generic[_Motion]):
         )
 
     def steer(self) -> None:
-        """Continue with the velocity gradient of the present step; strain and integrator go on."""
+        """Continue with the velocity gradient of the present step; strain and integrator continue."""
         gradient = self.settings.gradient_at(self.session.step)
         self.session.commands(f"fix_modify flow {gradient}\nrun 0 post no")
 
@@ -249,7 +249,7 @@ class FlowRun(Generic[_Motion]):
         return self._time + (self.session.step - self._step_of_time) * self.settings.dt
 
     def mark(self) -> Checkpoint:
-        """Return all that is needed to go on, and go on as after reading it.
+        """Return all that a resumed run needs, and continue as after reading it.
 
         Writing a restart file wraps and sorts atoms and, in a tilted box, rounds their positions, so it is written
         at every mark, needed or not.

@@ -120,7 +120,7 @@ class QuasistaticShear:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Settings as attributes: those of one strain, or of cycles."""
+        """Settings as attributes, those of one strain or of cycles."""
         without = {"strain_end"} if self.cycles else {"amplitude", "cycles"}
         without |= {"box"} if self.box == ISOTROPIC else set()
         without |= {"strain_step"} if self.stress_step else {"stress_step"}
@@ -235,9 +235,9 @@ class Row(NamedTuple):
     S_2: float
     director: float
     stress: float
-    """Derivative of the energy by strain over the volume: -p_xy of simple shear."""
+    """Derivative of the energy by strain over the volume, -p_xy in simple shear."""
     lost: float
-    """Energy over the volume dissipated by the step: work of stress and pressure minus the change of energy."""
+    """Energy dissipated by the step, over the volume (work of stress and pressure minus the change of energy)."""
     residual: float
     evaluations: int
     wall_seconds: float

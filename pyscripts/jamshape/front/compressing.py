@@ -112,7 +112,7 @@ def compress(
     again : bool
         Start over, whatever the file holds.
     seconds : float, optional
-        Time after which the run is put down at its next checkpoint, before a queue ends it; the same call goes on.
+        Time after which the run stops at its next checkpoint, before a queue ends it; the same call resumes it.
     progress : bool
         Whether to show progress on standard error.
 

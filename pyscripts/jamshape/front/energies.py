@@ -171,7 +171,7 @@ class Energy(Record):
 
     @cached_property
     def hessian_product(self) -> LinearOperator:
-        """(c, c) `scipy.sparse.linalg.LinearOperator`: the Hessian times a vector, without assembling it.
+        """(c, c) `scipy.sparse.linalg.LinearOperator` that multiplies the Hessian by a vector, without assembling it.
 
         Errors are those of `jamshape.energy`.
         """

@@ -43,7 +43,7 @@ class EnsembleFile(Recorded):
 
     @property
     def outcome(self) -> NDArray[np.str_]:
-        """(S,) how each sample ended: ``converged``, ..., or ``failed`` without a packing."""
+        """(S,) outcome of each sample, such as ``converged``, or ``failed`` without a packing."""
         names = np.array(str(self.about["outcomes"]).split())
         return np.asarray(names[self["outcome"].astype(int)])
 

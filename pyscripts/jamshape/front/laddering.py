@@ -38,8 +38,10 @@ def ladder(
     ----------
     packing : Packing or path
         Packing, or a file that `load` reads, whose last frame to take.
-    u0, pressure : sequence of float, [energy / length^D]
-        Energy densities or pressures, in the order in which to reach them.
+    u0 : sequence of float, [energy / length^D], optional
+        Energy densities, in the order in which to reach them.
+    pressure : sequence of float, [energy / length^D], optional
+        Pressures, in the order in which to reach them, instead of `u0`.
     box : str
         How the box yields, as in `make_packing`.
     accuracy : float

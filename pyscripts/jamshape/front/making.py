@@ -126,7 +126,7 @@ def make_packing(
     again : bool
         Start over, whatever the file holds, but for a compression in LAMMPS that serves this packing.
     seconds : float, optional
-        Time after which the work is put down at its next checkpoint, before a queue ends it; the same call goes on.
+        Time after which the work stops at its next checkpoint, before a queue ends it; the same call resumes it.
     progress : bool
         Whether to show progress on standard error.
 

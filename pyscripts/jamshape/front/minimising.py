@@ -41,7 +41,7 @@ def minimise(
     seconds: float | None = None,
     progress: bool = True,
 ) -> Packing:
-    """Minimise the energy of a packing at its box, or lead it to a pressure, an energy or a packing fraction.
+    """Minimise the energy of a packing in its box, or at a given pressure, energy or packing fraction.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def _aim(
 
 
 def _made_from(state: Packing) -> dict[str, object]:
-    """Describe the state, and tell it from others, wherever its file lies."""
+    """Describe the state, and distinguish it from others, wherever its file is."""
     name = state.file.name if state.file else "packing"
     return told_of(state) | {"start": name}
 

@@ -44,6 +44,9 @@ FEW = 20  # default number of modes of the sparse method
 class Modes(ModeTable):
     """Modes of a packing by ascending eigenvalue, with their properties; ``modes["participation"]`` looks up a column.
 
+    ``modes["band"]`` is -1 for translations, 0 for the low band (held by the prestress at second order), 1 for the middle
+    one (at first order), 2 for the high one (stretching of bonds) and 3 where bands do not separate.
+
     Parameters
     ----------
     columns, vectors, coordinates, singular_values, attributes

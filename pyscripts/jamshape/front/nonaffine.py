@@ -16,10 +16,11 @@ def nonaffine(first: Held, second: Held, *, neighbours: float | None = None) -> 
 
     Parameters
     ----------
-    first, second : Packing or path
-        States of the same particles, matched by their IDs, with any box and tilt. Of a file that
-        `jamshape.load` reads, the last frame is taken. The map of the box is the smaller one where tilts may have
-        flipped, so that tilts should change by less than half an edge.
+    first : Packing or path
+        Reference state. Of a file that `jamshape.load` reads, the last frame is taken.
+    second : Packing or path
+        Another state of the same particles, matched by their IDs, with any box and tilt. The map of the box is the
+        smaller one where tilts may have flipped, so that tilts should change by less than half an edge.
     neighbours : float, [length], optional
         Distance of centres up to which particles are neighbours in the first state; by default 1.5 times the largest
         distance of touching particles.

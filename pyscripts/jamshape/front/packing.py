@@ -68,9 +68,14 @@ class Packing(PackingLike):
         Constants of the contacts; by default k_e = 1 and two bonds side to side.
     step : int
     time : float, [time]
-    position_rest, orientation_rest, edges_rest, tilt_rest : arrays as above, of float64, optional
-        Low-order parts of position, orientation, edges and tilt in double-double precision; zeros by default.
-        See `poses`.
+    position_rest : (N, D) array of float64, [length], optional
+        Low-order part of the position in double-double precision; zeros by default. See `poses`.
+    orientation_rest : array as `orientation`, of float64, optional
+        Low-order part of the orientation.
+    edges_rest : (D,) array of float64, [length], optional
+        Low-order part of the edges.
+    tilt_rest : (D (D - 1) / 2,) array of float64, [length], optional
+        Low-order part of the tilt.
     results : mapping of str to number or str, optional
         Attributes of its file: how it was made and what was measured.
     file : Path, optional

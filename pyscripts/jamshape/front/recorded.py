@@ -43,11 +43,11 @@ class Kind(NamedTuple):
     opens: type[Recorded]
     """Class of the run."""
     plan_of: Callable[[Mapping[str, Any]], Plan | None] | None = None
-    """Makes a plan from the attributes of a file; None if they do not tell all, as of parts of a packing."""
+    """Makes a plan from the attributes of a file; None if they are incomplete, as of parts of a packing."""
 
 
 def recorded(path: Path, plan: Plan, *, again: bool, seconds: float | None, progress: bool) -> None:
-    """Record a run, or go on with it, showing progress; errors as `record`, and warnings as `resume`."""
+    """Record or resume a run, showing progress; errors as `record`, and warnings as `resume`."""
     require_path(path)
     require_given(seconds=seconds)
     with display(shown=progress) as tell:

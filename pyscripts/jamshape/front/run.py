@@ -95,7 +95,7 @@ class Recorded:
 
     @cached_property
     def about(self) -> dict[str, Any]:
-        """Attributes of the file: particles and settings."""
+        """Attributes of the file (particles and settings)."""
         return read_attributes(self.file)
 
     @cached_property
@@ -346,7 +346,7 @@ class CyclicShearFile(Recorded):
 
     @property
     def stress(self) -> FloatArray:
-        """(T,) stress that does work on the strain, [energy / length^D]: -p_xy, or p_yy - p_xx of pure shear."""
+        """(T,) stress that does work on the strain, [energy / length^D]; it is -p_xy, or p_yy - p_xx in pure shear."""
         return -self["normal_difference" if self.about["flow"] == "pure" else "p_xy"]
 
     @property
@@ -494,7 +494,7 @@ class QuasistaticShearFile(Recorded):
 
     @property
     def stress(self) -> FloatArray:
-        """(T,) dU/d(strain) over the volume, [energy / length^D]: the shear stress of simple shear."""
+        """(T,) dU/d(strain) over the volume, [energy / length^D]; the shear stress in simple shear."""
         return self["stress"]
 
     @checked
@@ -614,7 +614,7 @@ class LadderFile(Recorded):
 
     @property
     def values(self) -> FloatArray:
-        """(T,) values of the control parameter: that of the start, and those asked for."""
+        """(T,) values of the control parameter, first that of the start and then the requested ones."""
         own = self[_OBSERVABLE_OF[self.parameter]]
         return np.concatenate([own[:1], self["goal"][1:]])
 
@@ -659,7 +659,7 @@ class LadderFile(Recorded):
     ) -> list[ContactChange]:
         """List the contacts that opened and closed from one state to the next.
 
-        Contacts of rattlers are included. Images of a pair are counted, not told apart.
+        Contacts of rattlers are included. Images of a pair are counted, not distinguished.
 
         Parameters
         ----------

@@ -105,7 +105,7 @@ def _instance(living: Living) -> Any:
         msg = f"{NAME} has no atoms, expected particles; create or read them first"
         raise ValueError(msg)
     if not lmp.extract_atom("ellipsoid"):
-        msg = f"{NAME} has atoms that are no ellipsoids, expected atom_style ellipsoid"
+        msg = f"{NAME} has atoms that are not ellipsoids, expected atom_style ellipsoid"
         raise ValueError(msg)
     return lmp
 

@@ -31,7 +31,7 @@ class Evaluation(NamedTuple):
     gradient: FloatArray
     """(n,) in the coordinates of the landscape, [energy / length]."""
     strain_gradient: float
-    """dU/d(strain) of the affine strain of `State.strained`: -D V p."""
+    """dU/d(strain) of the affine strain of `State.strained`, equal to -D V p."""
     bond_force: float
     """Mean magnitude of the force of a bond; 0 without bonds."""
     n_bonds: int
@@ -82,7 +82,7 @@ class Landscape:
 
     @cached_property
     def stiffness(self) -> float:
-        """The unit of energy: k_e, the largest one of a table."""
+        """The unit of energy, k_e, or the largest one of a table."""
         return float(np.max(self.k_e))
 
     def stiffness_at(self, bond_force: float) -> float:
@@ -94,12 +94,12 @@ class Landscape:
 
     @cached_property
     def rotation_length(self) -> FloatArray:
-        """(N,) lengths that scale radians: A, or a; 0 where nothing can rotate."""
+        """(N,) lengths that scale radians (A, or a); 0 where nothing can rotate."""
         return np.asarray(self.bodies.rotation_length)
 
     @cached_property
     def inner_radius(self) -> FloatArray:
-        """(N,) smallest lengths of the particles: R, or the shortest semi-axis."""
+        """(N,) smallest lengths of the particles, R or the shortest semi-axis."""
         return np.asarray(self.bodies.inner_radius)
 
     @cached_property
@@ -109,7 +109,7 @@ class Landscape:
 
     @cached_property
     def length(self) -> float:
-        """The unit of length: twice the smallest of `inner_radius`."""
+        """The unit of length, twice the smallest of `inner_radius`."""
         return 2 * float(self.inner_radius.min())
 
     @cached_property

@@ -39,7 +39,7 @@ class ContactChange(NamedTuple):
     ids: tuple[int, int]
     """IDs of the two particles, ascending; equal for a particle and its own periodic image."""
     bond: int
-    """Number of the bond between the two, from 1: 2 is the second bond of a side-to-side contact, or another image."""
+    """Number of the bond between the two, from 1; 2 is the second bond of a side-to-side contact, or another image."""
     change: str
     """"opened" or "closed"."""
     returns: bool | None = None
@@ -57,7 +57,7 @@ class At(Record):
     def bonds(self) -> set[Bond]:
         """All bonds between particles, those of rattlers included.
 
-        Images of a pair are counted, not told apart: the vectors of a sheared box change.
+        Images of a pair are counted, not distinguished: the vectors of a sheared box change.
         """
         network = find_contacts(self.packing)
         count: Counter[tuple[int, int]] = Counter()

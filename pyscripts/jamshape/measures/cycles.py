@@ -110,8 +110,10 @@ def moduli_of(strain: FloatArray, stress: FloatArray) -> Moduli:
 
     Parameters
     ----------
-    strain, stress : (n + 1,) arrays
+    strain : (n + 1,) array
         At equal distances in time, or of the phase.
+    stress : (n + 1,) array
+        At the same times.
 
     Examples
     --------
@@ -140,8 +142,10 @@ def distance(first: Packing, second: Packing, *, rattlers: bool) -> Distance:
 
     Parameters
     ----------
-    first, second : Packing
-        Two states of the same particles.
+    first : Packing
+        Reference state.
+    second : Packing
+        Another state of the same particles.
     rattlers : bool
         Whether rattlers count; if not, particles that are rattlers in either state do not, unless all are.
     """

@@ -93,7 +93,7 @@ class Jamming(NamedTuple):
 
     @property
     def phi_J_error(self) -> float:
-        """Standard deviation of a uniform distribution in the bracket: its width over sqrt(12).
+        """Standard deviation of a uniform distribution in the bracket, its width over sqrt(12).
 
         Examples
         --------

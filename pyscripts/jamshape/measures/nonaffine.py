@@ -85,8 +85,10 @@ def relative_motion(first: Packing, second: Packing, held: BoolArray) -> FloatAr
 
     Parameters
     ----------
-    first, second : Packing
-        Two states of the same particles.
+    first : Packing
+        Reference state.
+    second : Packing
+        Another state of the same particles.
     held : (N,) array of bool
         Particles of the first state that count, at least one.
 

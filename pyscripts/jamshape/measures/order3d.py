@@ -25,7 +25,7 @@ class Order(NamedTuple):
     """Magnitude and direction of orientational order."""
 
     magnitude: float
-    """S_2 or C_4: 1 for perfect order; for random orientations 0.044 or 0.064 at N = 400."""
+    """S_2 or C_4, 1 for perfect order; for random orientations 0.044 or 0.064 at N = 400."""
     direction: FloatArray
     """(3,) unit vector, of either sign; arbitrary without order."""
 

@@ -32,7 +32,7 @@ class SteadyMean(NamedTuple):
     error: float
     """Standard error, from blocks longer than the memory."""
     memory: float
-    """Correlation strain: twice the integral of the autocorrelation."""
+    """Correlation strain, twice the integral of the autocorrelation."""
     independent: float
     """Number of correlation strains averaged over."""
 
@@ -84,7 +84,7 @@ class Blocks(NamedTuple):
     mean: float
     error: float
     inefficiency: float
-    """Statistical inefficiency: samples per independent sample."""
+    """Statistical inefficiency, samples per independent sample."""
 
 
 def block_average(values: FloatArray) -> Blocks:

@@ -95,7 +95,7 @@ class History:
 
     @classmethod
     def of(cls, told: Mapping[str, NDArray[Any]]) -> History:
-        """Go on from rows of `told`; time goes on, too."""
+        """Continue from rows of `told`, and from their time."""
         rows = {name: told[name].tolist() for name in _ROWS}
         passed = rows["wall_seconds"][-1] if rows["wall_seconds"] else 0.0
         return cls(time.perf_counter() - passed, **rows)

@@ -12,8 +12,8 @@ from jamshape.minima.nonsmooth import at_rest
 # L-BFGS, cheap while contacts open and close, hands over to Newton's method below this residual.
 _NEWTON_BELOW = 1e-2
 
-# Evaluations without a gain after which a minimisation has stalled, usually on a kink; and those with which one of this
-# tolerance goes on from there without a kink, where flat sides slide. On the way to an energy a stalled state suffices.
+# Evaluations without a gain after which a minimisation has stalled, usually on a kink; and, for a tolerance this fine, after
+# which it has stalled without a kink, where flat sides slide. On the way to an energy a stalled state suffices.
 _PATIENCE, _LONG_PATIENCE, _FINE = 500, 5000, 1e-6
 
 

@@ -57,7 +57,7 @@ class Piece:
     """(n,) point relative to the base of the kink, [length]."""
     evaluation: Evaluation
     relaxed: FloatArray
-    """(n,) inverse Hessian times gradient: a Newton step back, [length]."""
+    """(n,) inverse Hessian times gradient, a Newton step back, [length]."""
 
 
 class Rest(NamedTuple):

@@ -112,7 +112,7 @@ class Box(Record):
 
     @property
     def tilt_factors(self) -> FloatArray:
-        """(D (D - 1) / 2,) each tilt over the edge along its direction: those of HOOMD-blue and freud."""
+        """(D (D - 1) / 2,) each tilt over the edge along its direction, as in HOOMD-blue and freud."""
         return Lengths.of(self.matrix / self.edges).tilt
 
     @property

@@ -180,7 +180,7 @@ class Packing(Record):
 
     @property
     def inner_radius(self) -> FloatArray:
-        """(N,) radii of the inscribed spheres, [length]: R of rods, the shortest semi-axis."""
+        """(N,) radii of the inscribed spheres, [length] (R of rods, the shortest semi-axis)."""
         return np.asarray(self._bodies.inner_radius)
 
     @property
@@ -197,7 +197,7 @@ class Packing(Record):
 
     @property
     def z_iso(self) -> float:
-        """Isostatic contact number: twice the mean number of `freedoms`."""
+        """Isostatic contact number, twice the mean number of `freedoms`."""
         return 2 * float(self.freedoms.mean())
 
     @property
@@ -226,7 +226,7 @@ class Packing(Record):
 
     @property
     def phi(self) -> float:
-        """Packing fraction: sum of areas (volumes) over that of the box."""
+        """Packing fraction, the sum of areas (volumes) over that of the box."""
         return float(np.sum(self.measures)) / self.box.volume
 
     @property
@@ -289,7 +289,7 @@ class Packing(Record):
 
     @property
     def to_store(self) -> dict[str, Any]:
-        """Return the results without attributes of a run: a single frame cannot be continued as a run."""
+        """Return the results without attributes of a run; a single frame cannot be continued as a run."""
         return {k: v for k, v in self.results.items() if k not in {"kind", "finished"}}
 
 

@@ -43,7 +43,7 @@ class State(Record):
 
     @cached_property
     def split(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Position, orientation, cell, each (2, ...): doubles and their low parts."""
+        """Position, orientation, cell, each (2, ...), as doubles and their low parts."""
         position, orientation, cell = map(_split, (self.position, self.orientation, self.cell))
         return position, orientation, cell
 

@@ -137,7 +137,7 @@ class ApproachDriver:
     first : Packing
     settings : Approach
     checkpoint : Checkpoint, optional
-        From which to go on.
+        Checkpoint to resume from.
     """
 
     def __init__(

@@ -91,7 +91,7 @@ class Means(NamedTuple):
         particles: Particles | None,
         settings: Mapping[str, Any],
     ) -> Means:
-        """Describe the arguments of a recipe, so that its file is enough to go on."""
+        """Describe the arguments of a recipe, so that its file is enough to resume."""
         given = dict(settings)
         if particles is not None:
             again = Particles.again(particles.shape.name, particles.told)
@@ -214,7 +214,7 @@ class EnsembleDriver:
         return {"n_rows": self._n_rows, "ended": ended, "failures": json.dumps(self._failures)}
 
     def results(self) -> Mapping[str, Any]:
-        """Return the reasons of failures, names of outcomes, and what resumes the file alone."""
+        """Return the reasons of failures, names of outcomes, and the arguments that resume the file alone."""
         known = {"failures": json.dumps(self._failures), "outcomes": " ".join(OUTCOMES)}
         means = self._means
         return known | {"arguments": means.arguments, "folder": str(means.folder or "")}

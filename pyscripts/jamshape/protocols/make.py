@@ -3,7 +3,7 @@
 A random start; compression to jamming, by dynamics, by quasistatic steps or at a fixed rate; the search for the
 target energy, if any; a strict minimum, if asked for; all measurements; and the file. Compressions in LAMMPS
 are runs with a file of their own, ``OUT.run.h5``, which serves searches for other energies; all other stages share one
-file until the packing is finished, ``OUT.making.h5``, from which an interrupted call goes on.
+file until the packing is finished, ``OUT.making.h5``, from which an interrupted call is resumed.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ _OF_SEARCH = ("phi_start", "search", "start", "protocol")
 
 
 def make(recipe: Recipe, out: Path, how: How = How()) -> None:  # noqa: B008
-    """Make a packing and write it to `out`, or go on with an interrupted call.
+    """Make a packing and write it to `out`, or resume an interrupted call.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def made(recipe: Recipe, how: How = How()) -> Packing:  # noqa: B008
             raise TimeLimitError(stopped("in the compression", how)) from error
         plan = _plan(recipe, run_file(recipe, out), lambda driver: found.append(driver.packing()))
         record(None, plan, how)
-    if not found:  # the caller's handler of a signal has let us go on
+    if not found:  # the caller's handler of a signal has returned
         raise KeyboardInterrupt
     return found[0]
 
@@ -228,7 +228,7 @@ class Pipeline:
     source : path or None
         File of the compression in LAMMPS.
     checkpoint : Checkpoint, optional
-        From which to go on.
+        Checkpoint to resume from.
     """
 
     at_mark = True
@@ -307,7 +307,7 @@ class Pipeline:
         return self._making.landscape.particles.with_(step=0, time=0.0)
 
     def checkpoint(self) -> Checkpoint:
-        """Return the number of the stage, its own checkpoint, and what stages before have handed on."""
+        """Return the number of the stage, its own checkpoint, and the packing that earlier stages handed to it."""
         assert self._stage is not None
         making = self._making
         found = {

@@ -1,4 +1,4 @@
-"""Recipes: what a packing is made of, and how."""
+"""Recipes: particles of a packing, and its preparation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stages of making a packing: each advances by a bounded piece of work, at whose end it can be put down.
+"""Stages of making a packing: each advances by a bounded piece of work, at whose end it can be interrupted.
 
 The continuation of a stage depends on the numbers of its checkpoint alone, to the last bit.
 """
@@ -48,7 +48,7 @@ _ADVANCES = {"extrapolation": extrapolate, "bisection": bisect}
 
 @dataclass(eq=False)
 class Making:
-    """A packing in the making: what one stage hands to the next.
+    """A packing in the making, as one stage hands it to the next.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class Making:
     landscape
         Landscape of the particles; it counts evaluations.
     state
-        State to go on from.
+        State to continue from.
     minimum
         The packing so far, once there is one.
     attributes
@@ -102,7 +102,7 @@ class Stage(Protocol):
         """Do a bounded piece of work."""
 
     def checkpoint(self) -> Checkpoint:
-        """Return all that is needed to go on."""
+        """Return all that is needed to resume."""
 
     def end(self) -> None:
         """Hand the results on."""

@@ -43,7 +43,7 @@ _TOUCHING = 1e-9  # residual of force balance there
 _SLIDE = 0.05  # relative fall of the energy above which particles rearrange, accepted only in short steps
 _SHORT, _SHORTER = 0.02, 2e-3  # length of these, and of those in which the packing may unjam
 
-_TURNED = 0.3  # cosine between steps, of either sign, that counts as going on or turning back
+_TURNED = 0.3  # cosine between steps, of either sign, that counts as continuing or turning back
 _LESS = 4.0  # reduction of the limits after failed steps and of particles that turn back
 
 _STEPS, _MORE_STEPS = 4, 400  # largest number of steps, for each particle and in addition

@@ -1,1 +1,1 @@
-"""Drivers and the recorder: how everything that goes on for long is put down and taken up again."""
+"""Drivers and the recorder: interruption and resumption of all long calculations."""

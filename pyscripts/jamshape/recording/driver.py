@@ -1,4 +1,4 @@
-"""Interface of long calculations: what they offer to be recorded, stopped and resumed.
+"""Interface of long calculations that are recorded, stopped and resumed.
 
 A driver advances by steps or by bounded pieces of work. At its *marks*, which its settings fix, it drops caches, pair
 lists, extrapolations and the order of atoms, whether or not a checkpoint is written there: what is computed does not
@@ -69,7 +69,7 @@ class Driver(Protocol):
         """Return the present state, with its step and time."""
 
     def checkpoint(self) -> Checkpoint:
-        """Return all that is needed to go on from here."""
+        """Return all that is needed to resume from here."""
 
     def results(self) -> Mapping[str, Any]:
         """Return attributes for the file: counts so far, and at the end what was found."""
@@ -89,8 +89,8 @@ class Plan:
     what
         Name in messages, with its article, such as ``a compression``.
     settings
-        Attributes that identify it: a file with others is refused, and one that has what is None here. Those that follow
-        from others are the last.
+        Attributes that identify it: a file with others is refused, and so is one that has an attribute which is None here. Those that
+        follow from others are the last.
     begin
         Makes the driver at its start.
     restore

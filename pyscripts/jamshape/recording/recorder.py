@@ -1,6 +1,6 @@
-"""The recorder: writes rows, frames and checkpoints of any driver, and takes up any interrupted run.
+"""The recorder: writes rows, frames and checkpoints of any driver, and resumes any interrupted run.
 
-While a run goes on, nothing else touches its file. The file is locked before it is read, and replaced as a whole at
+During a run nothing else touches its file. The file is locked before it is read, and replaced as a whole at
 checkpoints, whose distance follows their cost, so that they take less than a fiftieth of the run. A killed run
 computes again what came after its last checkpoint, to the same bits.
 """
@@ -39,7 +39,7 @@ class How(NamedTuple):
     again: bool = False
     """Begin anew, whatever the file holds."""
     seconds: float | None = None
-    """Time after which the run is put down at the next mark, [seconds]."""
+    """Time after which the run stops at the next mark, [seconds]."""
     tell: Callable[[Row], None] = lambda _: None
     """Receives every row, once it is safe where a checkpoint was due."""
 
@@ -48,7 +48,7 @@ _USUAL = How()
 
 
 def record(path: Path | None, plan: Plan, how: How = _USUAL) -> None:
-    """Record a run to its end, or go on with it; a finished one is left alone.
+    """Record a run to its end, or resume it; a finished one remains unchanged.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def record(path: Path | None, plan: Plan, how: How = _USUAL) -> None:
     ValueError
         If the file holds another run.
     TimeLimitError
-        If `how.seconds` are over before the end; the file holds all that is needed to go on.
+        If `how.seconds` are over before the end; the file holds all that is needed to resume.
     FileFormatError
         If the file cannot be read as a run.
     OSError
@@ -113,7 +113,7 @@ class _Run:
 
 
 def _follow(run: _Run, interrupts: Interrupts, how: How, end: float) -> None:
-    """Advance to the end, or to the mark at which the run is put down, after a time."""
+    """Advance to the end, or to the mark at which the run stops after a time."""
     content, driver = run.content, run.driver
     if (first := driver.first()).told.part is not None:
         how.tell(first)
@@ -139,15 +139,15 @@ def _follow(run: _Run, interrupts: Interrupts, how: How, end: float) -> None:
 
 
 def stopped(where: str, how: How, path: Path | None = None) -> str:
-    """Return the message that the time was up; only with a file the run can go on."""
+    """Return the message that the time was up; only with a file the run can be resumed."""
     said = f"stopped after {how.seconds:.3g} s {where}, expected the end"
     if path is None:
-        return f"{said}; with a file the same call goes on from there"
+        return f"{said}; with a file the same call resumes it"
     return f"{path}: {said}; the same command resumes"
 
 
 def _opened(path: Path, plan: Plan, how: How) -> _Run | None:
-    """Begin a run, or go on with that of a file; None if that is finished."""
+    """Begin a run, or resume that of a file; None if that is finished."""
     remove_leftovers(path)
     content = None if how.again or not path.exists() else Content.read(path)
     if content is None:
@@ -169,7 +169,7 @@ def _begun(path: Path, plan: Plan) -> _Run:
 
 
 def _resumed(content: Content, plan: Plan) -> _Run:
-    """Go on from the checkpoint of a file."""
+    """Resume from the checkpoint of a file."""
     checkpoint, content.checkpoint = content.checkpoint, None
     try:
         if checkpoint is not None:

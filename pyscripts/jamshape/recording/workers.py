@@ -34,7 +34,7 @@ class Done(NamedTuple):
     """Place in the list of tasks."""
     result: Any = None
     failure: str | None = None
-    """Reason for which there is no result: the message of an expected error, or the end of the process."""
+    """Reason for which there is no result, the message of an expected error, or the end of the process."""
 
 
 PROBLEMS = (OSError, ValueError, RuntimeError, ImportError)
@@ -191,7 +191,7 @@ def _receive(pipe: IO[bytes], tasks: queue.SimpleQueue[Any]) -> None:
 
 
 def _answer(module: str, function: str, arguments: tuple[Any, ...]) -> tuple[Any, Any]:
-    """Return a result, and why there is none: a text, or an error that nobody expects."""
+    """Return a result, and why there is none: a text, or an unexpected error."""
     try:
         return getattr(importlib.import_module(module), function)(*arguments), None
     except PROBLEMS as error:

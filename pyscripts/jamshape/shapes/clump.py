@@ -37,7 +37,7 @@ class Discs(Parameter):
         Raises
         ------
         ValueError
-            If they are no discs.
+            If they are not discs.
         """
         rows = _rows(value)
         if rows.shape[1] == _WIDTH:

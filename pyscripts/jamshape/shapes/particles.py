@@ -100,7 +100,7 @@ class Particles:
 
     @property
     def identity(self) -> dict[str, Any]:
-        """Return `told` with all that identifies the particles in a file: None for a law that is not to be there."""
+        """Return `told` with all that identifies the particles in a file; None for a law that is not to be there."""
         return {"law": None} | dict(self.told)
 
     def under(self, law: str | float) -> Particles:
@@ -251,7 +251,7 @@ def parse_kind(text: str) -> Kind:
 
 
 def _number(text: str) -> Any:
-    """Return a number, or the text of a parameter that is none; raise ValueError for empty ones."""
+    """Return a number, or the text of a parameter that is not a number; raise ValueError for empty ones."""
     with suppress(ValueError):
         return float(text)
     if not any(sign.isspace() or sign in "/." for sign in text.strip()):

@@ -73,7 +73,7 @@ def rows_of(name: str, value: Any, widths: tuple[int, ...], expected: str) -> Fl
     Parameters
     ----------
     name : str
-        What they are, in messages.
+        Their name in messages.
     value : array_like or str
     widths : tuple of int
         Allowed numbers in a row.
@@ -83,7 +83,7 @@ def rows_of(name: str, value: Any, widths: tuple[int, ...], expected: str) -> Fl
     Raises
     ------
     ValueError
-        If they are no finite numbers, or rows have other lengths.
+        If they are not finite numbers, or rows have other lengths.
     """
     given = value
     if isinstance(value, str):

@@ -33,7 +33,7 @@ class SurfaceArea(NamedTuple):
     area: FloatArray
     """(...), [length^2]"""
     error: FloatArray
-    """(...), [length^2]: change by the last halving of the step."""
+    """(...), [length^2], change by the last halving of the step."""
 
 
 def perimeter(semi_axes: ArrayLike, p: float) -> float:

@@ -140,7 +140,7 @@ def stiffness_text(k_e: Stiffness) -> str:
 
 
 def stiffness_told(text: str) -> Stiffness:
-    """Read k_e from `stiffness_text`; raises ValueError if it is none."""
+    """Read k_e from `stiffness_text`; raises ValueError for any other text."""
     rows = [[float(word) for word in row.split(",")] for row in text.split(";")]
     return stiffness_of(rows if "," in text or ";" in text else rows[0][0])
 

@@ -39,7 +39,7 @@ class Corners(Parameter):
         Raises
         ------
         ValueError
-            If they are no corners of a convex polygon.
+            If they are not the corners of a convex polygon.
         """
         rows = rows_of("corners", value, (2,), "x y of each corner of a convex polygon")
         step = np.roll(rows, -1, axis=0) - rows

@@ -54,17 +54,17 @@ class Moduli(NamedTuple):
     pressure: float
     """[energy / length^D], in the same state."""
     B: ElasticTensor
-    """Change of the stress by strain: second derivatives of the enthalpy, with mean and extremal shear moduli."""
+    """Change of the stress by strain, the second derivatives of the enthalpy, with mean and extremal shear moduli."""
     C: ElasticTensor
     """Second derivatives of the energy by Green's strain."""
     bordered: Eigenvalue
     """Smallest eigenvalue of the bordered Hessian (`jamshape.vibration.stability`), [energy / length^2]."""
     n_floppy: int = 0
-    """Number of floppy modes: eigenvalues below their bounds. They are left out of the moduli."""
+    """Number of floppy modes, with eigenvalues below their bounds. They are left out of the moduli."""
     n_unsettled: int = 0
     """Number of further modes left out, along which the minimum is farther away than the mean overlap."""
     n_negative: int = 0
-    """Number of negative eigenvalues among known modes: at a saddle, moduli are not what shear measures."""
+    """Number of negative eigenvalues among known modes; at a saddle the moduli differ from those that shear measures."""
 
     @property
     def is_stable_to_shear(self) -> bool | None:

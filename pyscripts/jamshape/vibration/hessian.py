@@ -79,7 +79,7 @@ class Coordinates(Record):
 
     @cached_property
     def embedding(self) -> Any:
-        """(N (D + T), n) scipy.sparse matrix: displacements and rotations of all particles."""
+        """(N (D + T), n) scipy.sparse matrix of the displacements and rotations of all particles."""
         width = self.direction.shape[1]
         row = self.particle[:, None] * width + np.arange(width)
         column = np.broadcast_to(np.arange(self.size)[:, None], row.shape)
@@ -109,9 +109,9 @@ class Bonds(NamedTuple):
     stiffness: FloatArray
     """(m,) second derivative of the energy along the bond, [energy / length^2]."""
     gradient: FloatArray
-    """(m, v) derivative of its length by the pair's variables: r_i - r_j, rotations of i and of j [radian]."""
+    """(m, v) derivative of its length by the pair's variables r_i - r_j, rotations of i and of j [radian]."""
     pull: FloatArray
-    """(m,) force over the square root of the stiffness: C^T pull are the bond forces."""
+    """(m,) force over the square root of the stiffness; C^T pull are the bond forces."""
 
 
 class Strains(NamedTuple):
@@ -120,7 +120,7 @@ class Strains(NamedTuple):
     stretched: FloatArray
     """(m, k) change of the bond lengths, times the square roots of their stiffness."""
     pushed: FloatArray
-    """(n, k) change of the forces by the prestress alone: -S between strain and coordinates."""
+    """(n, k) change of the forces by the prestress alone, -S between strain and coordinates."""
     affine: LongArray
     """(k, k) second derivatives of the energy by the prestress alone, in long double."""
 
@@ -201,7 +201,7 @@ class DynamicalMatrix(Record):
 
     @cached_property
     def overlap_rounding(self) -> FloatArray:
-        """(C,) bound of the relative rounding error of the contacts' forces: overlaps are small differences of lengths.
+        """(C,) bound of the relative rounding error of the contacts' forces; overlaps are small differences of lengths.
 
         A force is stiffness times overlap; lengths are of the order of the separation, in long double.
         """
@@ -211,13 +211,13 @@ class DynamicalMatrix(Record):
 
     @cached_property
     def prestress_rounding(self) -> Any:
-        """(n, n) scipy.sparse CSR matrix: bound of the error of S by rounding of overlaps."""
+        """(n, n) scipy.sparse CSR matrix, bound of the error of S by rounding of overlaps."""
         scatter = _Scatter(self.contacts["particles"], self.coordinates)
         return scatter.sizes(self.overlap_rounding[:, None, None] * self.curvature)
 
     @cached_property
     def translations(self) -> FloatArray:
-        """(n, D c) orthonormal columns: the null modes of M, D for each of c clusters of particles."""
+        """(n, D c) orthonormal columns, the null modes of M, D for each of c clusters of particles."""
         backbone, D = self.coordinates.backbone, self.coordinates.dimension
         first, second = np.searchsorted(backbone, self.bonds.particles.T)
         n = len(backbone)

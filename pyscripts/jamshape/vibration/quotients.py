@@ -28,7 +28,7 @@ class Quotients(NamedTuple):
     value: LongArray
     """(k,)"""
     residual: FloatArray
-    """(k,) norms of M v - value v for |v| = 1: an eigenvalue lies within this distance."""
+    """(k,) norms of M v - value v for |v| = 1; an eigenvalue lies within this distance."""
     rounding: FloatArray
     """(k,) rounding error of the value itself."""
     entries: FloatArray
@@ -95,8 +95,10 @@ def isolated_error(values: FloatArray, residual: FloatArray) -> FloatArray:
 
     Parameters
     ----------
-    values, residual : (k,) array of float64
-        Rayleigh quotients, and norms of M v - value v.
+    values : (k,) array of float64
+        Rayleigh quotients.
+    residual : (k,) array of float64
+        Norms of M v - value v.
 
     Returns
     -------

@@ -109,7 +109,7 @@ class Sliding:
         """Find the step that lowers the energy most to first order, limited by the walls.
 
         Along negative curvature the energy falls faster than its slope. So this is a linear programme, whose
-        solution is a vertex: each motion goes on to a wall, or to its limit.
+        solution is a vertex: each motion continues to a wall, or to its limit.
 
         Parameters
         ----------

@@ -57,7 +57,7 @@ class Stability(NamedTuple):
     eigenvalue: Eigenvalue
     """[energy / length^2]; translations do not count."""
     strain: FloatArray
-    """(D, D) strain of the box, upper triangular: the box is deformed by 1 + strain (`State.deformed`)."""
+    """(D, D) strain of the box, upper triangular; the box is deformed by 1 + strain (`State.deformed`)."""
     motion: FloatArray
     """(n,) motion of the particles in coordinates of the landscape (`Landscape.displaced`), beside that strain."""
 

@@ -73,7 +73,7 @@ class Band(NamedTuple):
     """Modes between two gaps, by magnitude of their eigenvalues."""
 
     name: str
-    """low: of second order in the prestress; middle: of first order; high: constrained by bonds."""
+    """``low`` (of second order in the prestress), ``middle`` (of first order) or ``high`` (constrained by bonds)."""
     modes: IntArray
     """Rows of the spectrum."""
     n_negative: int
@@ -99,7 +99,7 @@ class Counts(NamedTuple):
     rank: int
     """Rank of H, from the singular values of C."""
     n_self_stress: int
-    """N_c - rank: one, and one more for each set of redundant bonds."""
+    """N_c - rank, which is one, and one more for each set of redundant bonds."""
     n_floppy: int
     """Modes but translations that H leaves free."""
     n_grazing: int
@@ -241,9 +241,9 @@ class Constraints(NamedTuple):
     n_self_stress: int
     """Number of states of self stress, m - rank."""
     n_zero_modes: int
-    """Motions that change no bond length, n - rank: translations, free spins and rattlers among them."""
+    """Motions that change no bond length, n - rank, translations, free spins and rattlers among them."""
     method: str
-    """``svd``, all singular values of K^(1/2) C; or ``pivots``, above 1500 bonds and coordinates: their number above the tolerance, by
+    """``svd``, all singular values of K^(1/2) C; or ``pivots``, above 1500 bonds and coordinates, their number above the tolerance, by
     Sylvester's law of inertia, from the signs of the pivots of a sparse factorisation."""
 
 

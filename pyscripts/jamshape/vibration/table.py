@@ -60,13 +60,14 @@ PARTS = ("affine", "rounding", "of_state")
 ERRORS = ("solver_error", "entry_error", "overlap_error")
 """Columns that contribute to the error bound of each eigenvalue."""
 
-_COLUMNS = (
+COLUMNS = (
     *("eigenvalues", "omega", "sign", *ERRORS, "state_error", "is_translation"),
     *("participation", "parallel", "perpendicular", "rotation", "of_round", "band"),
 )
+"""Data sets of a table of modes, /modes in its file."""
 
 _REQUIRED = (
-    *(f"modes/{name}" for name in _COLUMNS),
+    *(f"modes/{name}" for name in COLUMNS),
     *(f"coordinates/{name}" for name in ("particle", "kind", "direction")),
     *("singular_values", "parameters"),
 )
@@ -218,7 +219,7 @@ def tabulate(
         "state_error": error,
         "band": band,
     }
-    columns |= {name: getattr(found, name) for name in _COLUMNS if name not in columns}
+    columns |= {name: getattr(found, name) for name in COLUMNS if name not in columns}
     return ModeTable(columns, found.vectors, coordinates, found.singular_values, attributes)
 
 
@@ -312,7 +313,7 @@ def write_modes(
     """
     c = table.coordinates
     with hdf5.written(path) as file:
-        for name in _COLUMNS:
+        for name in COLUMNS:
             hdf5.put(file, f"modes/{name}", table[name])
         hdf5.set_attributes(file["modes"], {"format_version": FORMAT_VERSION, "version": version()})
         if vectors:
@@ -384,7 +385,7 @@ def table_of(file: h5py.File) -> ModeTable:
         read("coordinates/direction", n, 3 * dimension - 3),
     )
     coordinates = Coordinates(particle, kind, direction, n_all, dimension)
-    columns = {name: read(f"modes/{name}", k) for name in _COLUMNS}
+    columns = {name: read(f"modes/{name}", k) for name in COLUMNS}
     stored = read("modes/vectors", n, k) if _has_column(file, "vectors") else np.empty((n, 0))
     is_impossible = dimension not in {2, 3} or (
         n and not 0 <= particle.min() <= particle.max() < n_all

@@ -62,8 +62,10 @@ class ElasticTensor:
         With forces balanced; NaN where undefined.
     affine : (d, d) array of float64
         If particles followed the strain of the box, at fixed orientations.
-    rounding, of_state : (d, d) array of float64
-        Bounds of the error of each entry, as of a `Modulus`.
+    rounding : (d, d) array of float64
+        Bound of the error of each entry due to rounding, as of a `Modulus`.
+    of_state : (d, d) array of float64
+        Bound of the error of each entry due to the residual forces of the state.
     reasons : tuple of str
         For each component, why its entries are undefined or their bounds unknown; otherwise empty.
 
@@ -143,7 +145,7 @@ class ElasticTensor:
 
     @property
     def G_ac(self) -> Modulus:
-        """Anisotropy: standard deviation of the shear modulus over directions.
+        """Anisotropy, the standard deviation of the shear modulus over directions.
 
         In 3D over all strains without change of volume and of one magnitude.
         """

@@ -149,5 +149,5 @@ def test_an_instance_without_ellipsoids_is_refused():
         session.commands(
             "region b block 0 5 0 5 0 5\ncreate_box 1 b\nmass 1 1\ncreate_atoms 1 single 1 1 1"
         )
-        with pytest.raises(ValueError, match="atoms that are no ellipsoids"):
+        with pytest.raises(ValueError, match="atoms that are not ellipsoids"):
             js.load(session)
