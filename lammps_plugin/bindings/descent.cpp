@@ -127,10 +127,9 @@ void export_descent(nb::module_ &m)
                    "(n,) derivative of the gradient with respect to the strain.")
       .def("solve", &PosedNewton::solve, "right"_a, "accuracy"_a,
            "Solve for each row of right (k, n), to this relative accuracy.")
-      .def(
-          "learn", &PosedNewton::learn, "part"_a, "has_closed"_a,
-          "Lower the shift after a step taken as a whole, raise it if a small part was. With"
-          " complete factors a step that a closing contact stopped counts as a whole.")
+      .def("learn", &PosedNewton::learn, "part"_a, "has_closed"_a,
+           "Lower the shift after a step taken as a whole, raise it if a small part was. With"
+           " complete factors a step that a closing contact stopped counts as a whole.")
       .def_prop_ro("shift", &PosedNewton::shift);
   nb::borrow<nb::class_<LocalEnergyModel>>(nb::type<LocalEnergyModel>())
       .def("part_within", &part_within, "x"_a, "longest_step"_a, "widest_turn"_a,

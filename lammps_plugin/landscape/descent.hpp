@@ -131,7 +131,8 @@ class Descent {
 
   /// A gain of a method is a fall of the energy or of the residual below these fractions of its
   /// lowest value; either may fall for long while the other does not. While rods slide both hardly
-  /// fall, but contacts close one by one until a minimum is reached: that counts for Newton's method.
+  /// fall, but contacts close one by one until a minimum is reached: that counts for Newton's
+  /// method.
   static constexpr double LESS_ENERGY = 0.98, LESS_RESIDUAL = 0.7;
   /// L-BFGS gains in waves: Newton's method takes over only after this many evaluations without a
   /// gain.
@@ -244,8 +245,8 @@ class Descent {
   bool is_astray() const
   {
     if (is_near) {
-      const bool is_late = about.has_complete_factors() ? evaluations > NEAR
-                                                        : evaluations > best + NO_CHEAP_GAIN;
+      const bool is_late =
+          about.has_complete_factors() ? evaluations > NEAR : evaluations > best + NO_CHEAP_GAIN;
       return residual() >= newton_below && is_late;
     }
     if (about.has_complete_factors() && returns == MOST_RETURNS) return false;
