@@ -491,6 +491,7 @@ def write_table(path: Path, header: Sequence[str], rows: Sequence[Sequence[Any]]
 TITLES = {
     "vanderwerf_2018": "VanderWerf, Jin, Shattuck & O'Hern, Phys. Rev. E 97, 012909 (2018)",
     "marschall_2018": "Marschall & Teitel, Phys. Rev. E 97, 012905 (2018)",
+    "zhang_2021": "Zhang, VanderWerf, Li, Zhang, Shattuck & O'Hern, Phys. Rev. E 104, 014901 (2021)",
     "yuan_2019": "Yuan, VanderWerf, Shattuck & O'Hern, Soft Matter (2019)",
 }
 
