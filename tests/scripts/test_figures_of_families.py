@@ -3,6 +3,7 @@
 import csv
 import json
 import runpy
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +37,7 @@ def test_slopes_are_those_between_pressures_with_the_same_contacts(series):
     checked = 0
     for path in sorted(series.glob("*.json")):
         rows = json.loads(path.read_text())
-        for low, high in zip(rows, rows[1:], strict=False):
+        for low, high in pairwise(rows):
             known = [row.get("slope") for row in (low, high)]
             stay = low["n_bonds"] == high["n_bonds"]
             if None in known or not stay or abs(known[1] / known[0] - 1) > 0.01:
