@@ -493,6 +493,7 @@ TITLES = {
     "marschall_2018": "Marschall & Teitel, Phys. Rev. E 97, 012905 (2018)",
     "zhang_2021": "Zhang, VanderWerf, Li, Zhang, Shattuck & O'Hern, Phys. Rev. E 104, 014901 (2021)",
     "marschall_shear": "Marschall, Keta, Olsson & Teitel, Phys. Rev. Lett. 122, 188002 (2019), and Phys. Rev. E 100, 032906 (2019) and 101, 032901 (2020)",
+    "brito_2018": "Brito, Ikeda, Urbani, Wyart & Zamponi, PNAS 115, 11736 (2018)",
     "yuan_2019": "Yuan, VanderWerf, Shattuck & O'Hern, Soft Matter (2019)",
 }
 

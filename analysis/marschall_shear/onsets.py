@@ -70,7 +70,10 @@ def figure_from(
         if means:
             error_bars(axes, means, discs, fmt=fmt, color=color(k), label=label)
     right.axhline(Z_ISO, **PAPER_LINE)
-    for axes, label in ((left, r"packing fraction $\phi_J$"), (right, "contacts per particle $z_J$")):
+    for axes, label in (
+        (left, r"packing fraction $\phi_J$"),
+        (right, "contacts per particle $z_J$"),
+    ):
         label_alpha_axis(axes, discs)
         axes.set_ylabel(label)
     left.legend(fontsize=8)
