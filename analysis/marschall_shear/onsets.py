@@ -43,9 +43,9 @@ class Onset(NamedTuple):
 
     alpha: float
     fits: ShearOnset
-    phi_J: Mean
-    """From yield pressures, or else from the viscosity."""
-    z_J: Mean
+    phi: Mean
+    """phi_J, from yield pressures or else from the viscosity."""
+    z: Mean
 
 
 def onset_of(alpha: float, runs: Sequence[ShearOf]) -> Onset:
@@ -62,8 +62,8 @@ def figure_from(
     figure = figure_of(10, 4.2, dpi=150)
     left, right = figure.subplots(1, 2)
     discs = discs_at(one.alpha for one in found)
-    shear = {one.alpha: one.phi_J for one in found if np.isfinite(one.phi_J.value)}
-    contacts = {one.alpha: one.z_J for one in found if np.isfinite(one.z_J.value)}
+    shear = {one.alpha: one.phi for one in found if np.isfinite(one.phi.value)}
+    contacts = {one.alpha: one.z for one in found if np.isfinite(one.z.value)}
     lines = [(left, shear, "o-", 0, "shear"), (right, contacts, "o-", 0, "shear")]
     lines.append((left, compressed, "D--", 1, "compression"))
     for axes, means, fmt, k, label in lines:
@@ -88,12 +88,12 @@ def figure_from(
 
 def summary(found: Sequence[Onset]) -> dict[str, Any]:
     """Count what the paper states; discs have another isostatic number."""
-    rods = [one for one in found if one.alpha > 0 and np.isfinite(one.z_J.value)]
-    z_J = [one.z_J for one in rods]
+    rods = [one for one in found if one.alpha > 0 and np.isfinite(one.z.value)]
+    z_J = [one.z for one in rods]
     inner = [z for z in z_J[1:-1] if exceeds(z, z_J[0]) and exceeds(z, z_J[-1])]
     counts = {"rods": len(rods), "hypostatic": sum(z.value < Z_ISO for z in z_J)}
     rows = [
-        {"alpha": one.alpha, "phi_J": one.phi_J, "z_J": one.z_J} | one.fits._asdict()
+        {"alpha": one.alpha, "phi_J": one.phi, "z_J": one.z} | one.fits._asdict()
         for one in found
     ]
     return {"onsets": rows, **counts, "z_J_peaks": int(bool(inner))}
