@@ -34,6 +34,8 @@ from common.text import conditions_text
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_SURE = 2.0  # errors
+
 
 class Forces(NamedTuple):
     """Forces of a system."""
@@ -45,6 +47,11 @@ class Forces(NamedTuple):
     """(B,) magnitudes over their mean in each packing, ascending."""
     theta: float
     theta_error: float
+
+    @property
+    def has_power(self) -> int:
+        """1 if theta is above 0 by more than two errors."""
+        return int(self.theta > _SURE * self.theta_error)
 
 
 def forces_of(file: PackingFile) -> FloatArray:
@@ -103,11 +110,12 @@ def main(options: Namespace) -> None:
         f = np.sort(np.concatenate([forces_of(file) for file in files]))
         Delta = files[0].number("aspect_ratio") - 1
         found.append(Forces(system, Delta, f, *exponent_of(f, options.below)))
+    found.sort(key=lambda one: one.Delta)
     title = conditions_text(groups, bars=False)
     save_figure(figure_from(found, title, options.below), options.out)
     rows = [
         {"family": family(one.system), "Delta": round(one.Delta, 9), "bonds": len(one.f)}
-        | {"theta": one.theta, "theta_error": one.theta_error}
+        | {"theta": one.theta, "theta_error": one.theta_error, "has_power": one.has_power}
         for one in found
     ]
     report({"out": options.out, "conditions": conditions(groups), "forces": rows})

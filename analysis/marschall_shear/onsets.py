@@ -93,8 +93,7 @@ def summary(found: Sequence[Onset]) -> dict[str, Any]:
     inner = [z for z in z_J[1:-1] if exceeds(z, z_J[0]) and exceeds(z, z_J[-1])]
     counts = {"rods": len(rods), "hypostatic": sum(z.value < Z_ISO for z in z_J)}
     rows = [
-        {"alpha": one.alpha, "phi_J": one.phi, "z_J": one.z} | one.fits._asdict()
-        for one in found
+        {"alpha": one.alpha, "phi_J": one.phi, "z_J": one.z} | one.fits._asdict() for one in found
     ]
     return {"onsets": rows, **counts, "z_J_peaks": int(bool(inner))}
 
