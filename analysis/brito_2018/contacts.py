@@ -108,22 +108,24 @@ def figure_from(
     points: list[Point], powers: Mapping[str, Power], groups: Groups, fit_to: float
 ) -> Figure:
     """Draw z - z_0, the fits and a slope of 1/2."""
-    figure = figure_of(8.6, 4.6, dpi=140)
+    figure = figure_of(8.6, 4.6, dpi=100)
     axes = figure.subplots()
     for one in points:
         style: dict[str, Any] = mark(one.system) | {"ls": "none", "capsize": 2}
+        style["mfc"] = style["color"] if one.system.dimension == 3 else "none"
         axes.errorbar(one.Delta, one.excess.value, one.excess.error, **style)
     Delta = np.geomspace(min(one.Delta for one in points), fit_to, 20)
     for name, power in powers.items():
         of = next(one.system for one in points if name_of(one.system) == name)
         label = rf"{name}: $\Delta^{{{power.x:.2f}\pm{power.x_error:.2f}}}$"
-        axes.plot(Delta, power.c * Delta**power.x, color=mark(of)["color"], lw=0.9, label=label)
+        line: dict[str, Any] = {"color": mark(of)["color"], "ls": ":" if of.dimension == 3 else "-"}
+        axes.plot(Delta, power.c * Delta**power.x, lw=0.9, label=label, **line)
     axes.plot(Delta, 2.5 * Delta**0.5, label=r"slope of $\Delta^{1/2}$", **PAPER_LINE)
     axes.set(xscale="log", yscale="log", ylabel="$z-z_0$")
     axes.set_xlabel(
         r"$\Delta$, aspect ratio $-\,1$; spherocylinders: $\alpha =\Delta$, ellipses: $w_1=1/(1+\Delta)$"
     )
-    title = conditions_text(groups)
+    title = f"{conditions_text(groups)}; filled: 3D"
     family_legend(axes, [one.system for one in points], title, loc="outside right center")
     return figure
 

@@ -81,7 +81,7 @@ def exponent_of(f: FloatArray, below: float) -> tuple[float, float]:
 
 def figure_from(found: Sequence[Forces], title: str, below: float) -> Figure:
     """Draw cumulative distributions on the left and theta on the right."""
-    figure = figure_of(10.5, 4.4, dpi=140)
+    figure = figure_of(10.5, 4.4, dpi=90)
     left, right = figure.subplots(1, 2)
     for k, one in enumerate(found):
         style = marked(k, "-")

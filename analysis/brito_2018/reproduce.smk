@@ -17,7 +17,7 @@ PLANE = add_sweep(
 )
 SPACE = add_sweep(
     "space",
-    f"--superellipsoid 1 1 1 {ELLIPSES} --samples {AT['space_samples']} --n {AT['n']} {AT['way']}",
+    f"--superellipsoid 1 1 1 {ELLIPSES} --size-ratio 1.4 --samples {AT['space_samples']} --n {AT['n']} {AT['way']}",
     AT["chunk"],
 )
 

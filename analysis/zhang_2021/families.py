@@ -59,7 +59,7 @@ class Families(NamedTuple):
     p: FloatArray
     """(k,)"""
     slopes: FloatArray
-    """(m, k) dG/dp of each family; NaN where contacts change or a modulus is not defined."""
+    """(m, k) dG/dp of each family; NaN where contacts change, a modulus is not defined, or the sign is uncertain."""
     slope: Means
     G: Means
     G_f: Means
@@ -73,6 +73,7 @@ class Families(NamedTuple):
 def families_of(alpha: float, n: int, table: Table) -> Families:
     """Average a system."""
     G, slopes, p = table.column("G"), table.column("slope"), table.pressures
+    slopes = np.where(table.column("slope_bound") < np.abs(slopes), slopes, np.nan)
     drawn = [by_families(p, mean_of(G[k]), mean_of(slopes[k])) for k in draws(len(G))]
     slope, of_G = Means(*mean_and_error(slopes)), Means(*mean_and_error(G))
     G_f = Means(by_families(p, of_G.value, slope.value), np.std(drawn, axis=0))
@@ -87,7 +88,7 @@ def by_families(p: FloatArray, G: FloatArray, slope: FloatArray) -> FloatArray:
 
 def figure_from(found: Sequence[Families]) -> Figure:
     """Draw the slopes, their signs, and both contributions to G."""
-    figure = figure_of(12.5, 4.4, dpi=130)
+    figure = figure_of(11, 4.0, dpi=85)
     left, middle, right = figure.subplots(1, 3)
     for k, of in enumerate(found):
         label = rf"$\alpha={of.alpha:g}$, {of.samples} packings"
