@@ -3,7 +3,8 @@
     python analysis/brito_2018/forces.py SWEEP [MORE ...] --out forces.png
 
 The distribution of small forces f, over their mean, is taken as f^theta. theta is the maximum likelihood of the forces below
---below, with its error: 1 + theta = 1 / <ln(below / f)>. The paper states that forces of hypostatic packings
+--below, with its error: 1 + theta = 1 / <ln(below / f)>. Of a smooth distribution with a finite P(0) it goes to 0 with the bound,
+in proportion to it; JSON has it for several bounds. The paper states that forces of hypostatic packings
 follow no power law, so that P(0) is finite and theta is 0, as they do in isostatic packings of round particles. Bonds
 of rattlers are left out. The last line of standard output is one JSON object.
 """
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _SURE = 2.0  # errors
+BOUNDS = (0.4, 0.2, 0.1, 0.05)
+"""Largest forces of further fits, over the mean."""
 
 
 class Forces(NamedTuple):
@@ -116,6 +119,7 @@ def main(options: Namespace) -> None:
     rows = [
         {"family": family(one.system), "Delta": round(one.Delta, 9), "bonds": len(one.f)}
         | {"theta": one.theta, "theta_error": one.theta_error, "has_power": one.has_power}
+        | {"by_bound": [(below, *exponent_of(one.f, below)) for below in BOUNDS]}
         for one in found
     ]
     report({"out": options.out, "conditions": conditions(groups), "forces": rows})
@@ -126,7 +130,7 @@ if __name__ == "__main__":
     parser.add_argument(
         "--below",
         type=float,
-        default=0.2,
+        default=0.1,
         help="largest force of the fit, over the mean (%(default)s)",
     )
     run(parser, main)
