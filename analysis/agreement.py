@@ -220,6 +220,8 @@ def ours_of(results: Mapping[str, Any], published: Published) -> Ours | None:
     if not isinstance(found, Mapping) or found.get("value") is None:
         return None
     unit = find(results, published.per)["value"] if published.per else 1.0
+    if not unit:  # a fraction of nothing
+        return None
     error = found.get("error")
     error = math.nan if error is None else error / unit
     ours = Ours(found["value"] / unit, error, int(found.get("samples") or 0))

@@ -44,14 +44,16 @@ class Onset(NamedTuple):
     alpha: float
     fits: ShearOnset
     phi: Mean
-    """phi_J, from yield pressures or else from the viscosity."""
+    """phi_J, from yield pressures or else from the viscosity; NaN if neither is among the packing fractions of the runs."""
     z: Mean
 
 
 def onset_of(alpha: float, runs: Sequence[ShearOf]) -> Onset:
     """Fit the runs of one aspect ratio."""
     fits = shear_onset(curves_of(runs))
-    phi_J = fits.from_yield if np.isfinite(fits.from_yield.value) else fits.from_viscosity
+    known = [one.ensemble.phi for one in runs]
+    within = (m for m in fits[:2] if min(known) <= m.value <= max(known))
+    phi_J = next(within, Mean(float("nan")))
     return Onset(alpha, fits, phi_J, at_phi(over_phi(slowest(runs), "z"), phi_J.value))
 
 
