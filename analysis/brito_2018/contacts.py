@@ -136,7 +136,7 @@ def main(options: Namespace) -> None:
     points = points_of(groups)
     powers = powers_of(points, options.fit_to)
     save_figure(figure_from(points, powers, groups, options.fit_to), options.out)
-    rows = [
+    rows: list[dict[str, Any]] = [
         {"family": name_of(p.system), "Delta": p.Delta, "z": p.z, "excess": p.excess}
         | {"hypostatic": p.hypostatic, "packings": p.packings}
         for p in points

@@ -70,7 +70,8 @@ def _joined(means: Sequence[Mean]) -> Mean:
 def at_phi(means: Mapping[float, Mean], phi: float) -> Mean:
     """Interpolate linearly between packing fractions; NaN outside."""
     known = list(means)
-    value, error = (_between(phi, known, [m[k] for m in means.values()]) for k in (0, 1))
+    value = _between(phi, known, [m.value for m in means.values()])
+    error = _between(phi, known, [m.error for m in means.values()])
     return Mean(value, error, min((m.samples for m in means.values()), default=0))
 
 
