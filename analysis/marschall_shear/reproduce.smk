@@ -40,18 +40,14 @@ def runs_of(alpha, gdot=None, phi=None):
     ]
 
 
-def draw(name, script, *inputs, after):
-    """Add a figure."""
-    figure(name, f"{script}.py", inputs, after)
-
-
-draw("onsets", f"{FOLDER}/onsets", list(RUNS.values()), "--packings packings/rods", after=[*ALL, "rods"])
-draw("order", f"{FOLDER}/order", list(RUNS.values()), after=ALL)
-draw("rheology", "shear/rheology", [runs_of(alpha, LOWEST) for alpha in AT["phis"]], after=ALL)
+EVERY = list(RUNS.values())
+figure("onsets", f"{FOLDER}/onsets.py", [EVERY, "--packings packings/rods"], [*ALL, "rods"])
+figure("order", f"{FOLDER}/order.py", EVERY, ALL)
+figure("rheology", "shear/rheology.py", [runs_of(alpha, LOWEST) for alpha in AT["phis"]], ALL)
 for alpha in AT["phis"]:
-    draw(f"flow_curves_alpha{alpha}", "shear/flow_curves", runs_of(alpha), after=[f"shears{alpha}"])
+    figure(f"flow_curves_alpha{alpha}", "shear/flow_curves.py", runs_of(alpha), [f"shears{alpha}"])
 LONGEST = max(AT["phis"], key=float)
-draw("class_stress", "shear/class_stress", runs_of(LONGEST, LOWEST), after=[f"shears{LONGEST}"])
+figure("class_stress", "shear/class_stress.py", runs_of(LONGEST, LOWEST), [f"shears{LONGEST}"])
 DENSEST = [runs_of(alpha, LOWEST, max(AT["phis"][alpha]))[0] for alpha in AT["phis"] if float(alpha)]
-draw("contact_angles", "shear/contact_angles", DENSEST, after=ALL)
-draw("rotation", "shear/rotation", DENSEST[-1:], after=[f"shears{LONGEST}"])
+figure("contact_angles", "shear/contact_angles.py", DENSEST, ALL)
+figure("rotation", "shear/rotation.py", DENSEST[-1:], [f"shears{LONGEST}"])
