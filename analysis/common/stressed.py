@@ -152,7 +152,7 @@ def contacts_of(matrix: DynamicalMatrix) -> set[tuple[int, ...]]:
 
 
 def led(packing: js.Packing | None, of: Series, pressure: float) -> js.Packing:
-    """Lead a packing to a pressure; None makes that of the series."""
+    """Relax a packing at a pressure; None makes that of the series."""
     if packing is not None:
         return js.minimise(packing, pressure=pressure, box=of.box, progress=False)
     particles = Particles.of(alpha=of.alpha)
