@@ -496,6 +496,7 @@ TITLES = {
     "zhang_2021": "Zhang, VanderWerf, Li, Zhang, Shattuck & O'Hern, Phys. Rev. E 104, 014901 (2021)",
     "marschall_shear": "Marschall, Keta, Olsson & Teitel, Phys. Rev. Lett. 122, 188002 (2019), and Phys. Rev. E 100, 032906 (2019) and 101, 032901 (2020)",
     "brito_2018": "Brito, Ikeda, Urbani, Wyart & Zamponi, PNAS 115, 11736 (2018)",
+    "rocks_hoy_2023": "Rocks & Hoy, Soft Matter (2023)",
     "yuan_2019": "Yuan, VanderWerf, Shattuck & O'Hern, Soft Matter (2019)",
 }
 

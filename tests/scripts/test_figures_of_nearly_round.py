@@ -76,3 +76,13 @@ def test_powers_of_contacts_are_found(monkeypatch):
         for Delta in (0.01, 0.03, 0.1)
     ]
     assert script["power_of"](points)[:2] == pytest.approx((2.5, 0.5))
+
+
+def test_contacts_of_ellipses_against_aspect_ratio(report, sweep, tmp_path):
+    out = tmp_path / "r.png"
+    ellipses = [path for path in sorted(sweep.glob("*.h5")) if not path.name.startswith("0")]
+    found = report("rocks_hoy_2023/aspect_ratio.py", *ellipses, "--out", out)
+    image(out)
+    assert (found["n_shapes"], found["shapes_below_6"]) == (3, 3)
+    by_ratio = {row["aspect_ratio"]["value"]: row for row in found["shapes"]}
+    assert sorted(by_ratio) == pytest.approx([1 / w1 for w1 in W1])
