@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Z_ISO = 6
+_FEWEST = 3  # aspect ratios, to tell of a peak
 
 
 class Onset(NamedTuple):
@@ -61,7 +62,7 @@ def figure_from(
     found: Sequence[Onset], compressed: dict[float, Mean], runs: Sequence[ShearOf]
 ) -> Figure:
     """Draw phi_J and z_J."""
-    figure = figure_of(10, 4.2, dpi=150)
+    figure = figure_of(10, 4.2, dpi=100)
     left, right = figure.subplots(1, 2)
     discs = discs_at(one.alpha for one in found)
     shear = {one.alpha: one.phi for one in found if np.isfinite(one.phi.value)}
@@ -97,7 +98,8 @@ def summary(found: Sequence[Onset]) -> dict[str, Any]:
     rows = [
         {"alpha": one.alpha, "phi_J": one.phi, "z_J": one.z} | one.fits._asdict() for one in found
     ]
-    return {"onsets": rows, **counts, "z_J_peaks": int(bool(inner))}
+    peaks = int(bool(inner)) if len(z_J) >= _FEWEST else None
+    return {"onsets": rows, **counts, "z_J_peaks": peaks}
 
 
 def main(options: Namespace) -> None:

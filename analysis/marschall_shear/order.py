@@ -71,7 +71,7 @@ def courses_of(alpha: float, runs: Sequence[ShearOf]) -> dict[str, Any]:
 
 def figure_from(rows: Sequence[dict[str, Any]], runs: Sequence[ShearOf]) -> Figure:
     """Draw both quantities."""
-    figure = figure_of(10, 4.2, dpi=150)
+    figure = figure_of(10, 4.2, dpi=100)
     left, right = figure.subplots(1, 2)
     _draw(left, rows, "S_2", "largest")
     _draw(right, rows, "rotation", "smallest")
