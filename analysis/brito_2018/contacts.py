@@ -1,10 +1,11 @@
-"""Draw the contacts of nearly round particles against asphericity: Brito, Ikeda, Urbani, Wyart & Zamponi, PNAS 115, 11736 (2018).
+"""Draw the contacts of nearly round particles against asphericity.
 
     python analysis/brito_2018/contacts.py SWEEP [MORE ...] --out contacts.png
 
 z - z_0 against Delta, the aspect ratio less 1; z_0 is the mean contact number of the round particles in the sweeps, in
-the same dimension and number. A power is fitted to each family with three shapes or more up to --fit-to. The paper states that packings are hypostatic:
-z < z_iso. The last line of standard output is one JSON object.
+the same dimension and number. A power is fitted to each family with three shapes or more up to --fit-to. Brito, Ikeda,
+Urbani, Wyart & Zamponi, PNAS 115, 11736 (2018), state that packings are hypostatic: z < z_iso. The last line of standard
+output is one JSON object.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
-"""Draw distributions of contact forces of round and of nearly round particles: Brito, Ikeda, Urbani, Wyart & Zamponi, PNAS 115, 11736 (2018).
+"""Draw distributions of contact forces of round and of nearly round particles.
 
     python analysis/brito_2018/forces.py SWEEP [MORE ...] --out forces.png
 
 The distribution of small forces f, over their mean, is taken as f^theta. theta is the maximum likelihood of the forces below
 --below, with its error: 1 + theta = 1 / <ln(below / f)>. Of a smooth distribution with a finite P(0) it goes to 0 with the bound,
-in proportion to it; JSON has it for several bounds. The paper states that forces of hypostatic packings
-follow no power law, so that P(0) is finite and theta is 0, as they do in isostatic packings of round particles. Bonds
-of rattlers are left out. The last line of standard output is one JSON object.
+in proportion to it; JSON has it for several bounds. Brito, Ikeda, Urbani, Wyart & Zamponi, PNAS 115, 11736 (2018), state
+that forces of hypostatic packings follow no power law, so that P(0) is finite and theta 0, unlike those of isostatic
+packings of round particles. Bonds of rattlers are left out. The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations

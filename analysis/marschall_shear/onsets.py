@@ -1,11 +1,11 @@
-"""Draw where steady shear jams, and with how many contacts, against aspect ratio: Marschall & Teitel, PRE 100, 032906 (2019).
+"""Draw where steady shear jams, and with how many contacts, against aspect ratio.
 
     python analysis/marschall_shear/onsets.py shears/*.h5 --packings packings/rods --out onsets.png
 
 phi_J of shear is where the yield pressure of the fits p = p_0 + c gdot^b vanishes (`analysis/shear/flow_curves.py`), and where
-these are too few where p / gdot diverges. z_J is the contact number at the lowest rate, interpolated at phi_J; the paper
-states that it is not monotonic in alpha and always below the isostatic 6. --packings adds phi_J by compression. The last line
-of standard output is one JSON object.
+these are too few where p / gdot diverges. z_J is the contact number at the lowest rate, interpolated at phi_J; Marschall &
+Teitel, PRE 100, 032906 (2019), state that it is not monotonic in alpha and always below the isostatic 6. --packings adds
+phi_J by compression. The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations

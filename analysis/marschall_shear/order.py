@@ -1,10 +1,10 @@
-"""Draw the order and the rotation of sheared rods against aspect ratio: Marschall, Keta, Olsson & Teitel, PRL 122, 188002 (2019).
+"""Draw the order and the rotation of sheared rods against aspect ratio.
 
     python analysis/marschall_shear/order.py shears/*.h5 --out order.png
 
-At the lowest rate: the nematic order S_2 in the most dilute and the densest flow and its largest value between, and the rotation over the strain
-likewise, with its smallest value. The paper, and Marschall, Van Hoesen & Teitel, PRE 101, 032901 (2020), state that both
-are not monotonic in phi, that S_2 stays finite at jamming and above as alpha goes to 0, and that rods rotate above jamming. The
+At the lowest rate: the nematic order S_2 in the most dilute and the densest flow and its largest value between, and the
+rotation over the strain likewise, with its smallest value. Marschall, Keta, Olsson & Teitel, PRL 122, 188002 (2019), and
+Marschall, Van Hoesen & Teitel, PRE 101, 032901 (2020), state that both are not monotonic in phi, that S_2 stays finite at jamming and above as alpha goes to 0, and that rods rotate above jamming. The
 last line of standard output is one JSON object, where a number counts as larger if by more than two joint errors.
 """
 

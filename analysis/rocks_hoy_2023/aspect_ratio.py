@@ -1,9 +1,9 @@
-"""Draw phi_J and z of ellipses against aspect ratio: Rocks & Hoy, Soft Matter (2023).
+"""Draw phi_J and z of ellipses against aspect ratio.
 
     python analysis/rocks_hoy_2023/aspect_ratio.py SWEEP [MORE ...] --out aspect_ratio.png
 
-The paper, of ellipses of aspect ratios from 1 to 10, states that z approaches the isostatic 6, and falls again towards 4 as local nematic order
-grows: here z at the largest aspect ratio must be below the largest z by two joint errors. The last line of standard output is
+Rocks & Hoy, Soft Matter (2023), with ellipses of aspect ratios from 1 to 10, state that z approaches the isostatic 6, and
+falls again towards 4 as local nematic order grows: here z at the largest aspect ratio must be below the largest z by two joint errors. The last line of standard output is
 one JSON object with averages and their standard errors.
 """
 
