@@ -220,6 +220,8 @@ def ours_of(results: Mapping[str, Any], published: Published) -> Ours | None:
     if not isinstance(found, Mapping) or found.get("value") is None:
         return None
     unit = find(results, published.per)["value"] if published.per else 1.0
+    if not unit:  # a fraction of nothing
+        return None
     error = found.get("error")
     error = math.nan if error is None else error / unit
     ours = Ours(found["value"] / unit, error, int(found.get("samples") or 0))
@@ -491,6 +493,10 @@ def write_table(path: Path, header: Sequence[str], rows: Sequence[Sequence[Any]]
 TITLES = {
     "vanderwerf_2018": "VanderWerf, Jin, Shattuck & O'Hern, Phys. Rev. E 97, 012909 (2018)",
     "marschall_2018": "Marschall & Teitel, Phys. Rev. E 97, 012905 (2018)",
+    "zhang_2021": "Zhang, VanderWerf, Li, Zhang, Shattuck & O'Hern, Phys. Rev. E 104, 014901 (2021)",
+    "marschall_shear": "Marschall, Keta, Olsson & Teitel, Phys. Rev. Lett. 122, 188002 (2019), and Phys. Rev. E 100, 032906 (2019) and 101, 032901 (2020)",
+    "brito_2018": "Brito, Ikeda, Urbani, Wyart & Zamponi, PNAS 115, 11736 (2018)",
+    "rocks_hoy_2023": "Rocks & Hoy, Soft Matter (2023)",
     "yuan_2019": "Yuan, VanderWerf, Shattuck & O'Hern, Soft Matter (2019)",
 }
 

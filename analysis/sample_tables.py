@@ -5,8 +5,8 @@
 
 FOLDER is what `jamshape reproduce` makes. Writes to the folder --out a table for each folder of packings (rods.csv of
 packings/rods, ordered.csv of packings/ordered1, packings/ordered2 and so on), ladder.csv of those that were led to
-other energies, modes.csv and runs.csv. They are what averages in figures are of, without the coordinates: seeds, sizes,
-how each one ended, and what was measured. Figures that need no coordinates are drawn from a table of packings as from
+other energies, modes.csv, runs.csv, shears.csv, and series.csv of packings at several pressures. They are what averages
+in figures are of, without the coordinates: seeds, sizes, how each one ended, and what was measured. Figures that need no coordinates are drawn from a table of packings as from
 their folder. A cell is empty where a file has no such number, and nan where there is none of such particles. --known names earlier tables, of another day or machine: their lines are kept, but for those of files
 that are in FOLDER again. Units are those of the files: the diameter and the stiffness k of the smaller
 particles (docs/explanation/files.md). The commands that made the files are in jobs.csv, and the versions in
@@ -16,6 +16,7 @@ versions.csv, which agreement.py writes. The last line of standard output is one
 from __future__ import annotations
 
 import csv
+import json
 import math
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Sequence
@@ -27,6 +28,7 @@ from jamshape.command import parser_of, report, run
 from jamshape.files.h5md import read_attributes, read_style
 from jamshape.files.outcomes import is_reached
 from jamshape.measures.runs import rate_of
+from jamshape.measures.shears import read_shear
 from jamshape.vibration.ensembles import TOLD, count_of, of_packing
 from jamshape.vibration.table import read_modes
 
@@ -46,6 +48,13 @@ MODES = (
     "wall_seconds",
 )  # fmt: skip
 
+STEADY = ("pressure", "sigma", "mu", "z", "S_2", "rotation")
+SHEAR = (
+    *SHAPE, "phi", "gdot", "flow", "integrator", "strain", "startup",
+    *STEADY, *(f"{name}_error" for name in STEADY),
+)  # fmt: skip
+AT_PRESSURE = ("G", "slope", "n_bonds", "phi")
+
 
 def told_packing(path: Path) -> dict[str, Any]:
     """Read what a packing is."""
@@ -64,6 +73,26 @@ def told_modes(path: Path) -> dict[str, Any]:
     counts: dict[str, Any] = {band: count_of(table, band) for band in TOLD}
     counts["negative"] = int((table["sign"] < 0).sum())
     return of_packing(table) | table.attributes | counts
+
+
+def told_shear(path: Path) -> dict[str, Any] | None:
+    """Read a steady shear and its averages; None of one without a steady state."""
+    of = read_shear(path)
+    if not of.steady:
+        return None
+    means = {name: of.steady.averages.get(name) for name in STEADY}
+    told = {name: mean.value for name, mean in means.items() if mean}
+    told |= {f"{name}_error": mean.error for name, mean in means.items() if mean}
+    own = {"seed": of.seed, "strain": of.strain[-1], "startup": of.steady.startup}
+    return read_attributes(path) | of.ensemble.report() | own | told
+
+
+def told_series(path: Path) -> dict[str, Any]:
+    """Read a packing at several pressures, a column for each number at each of them."""
+    rows = json.loads(path.read_text(encoding="utf-8"))
+    of_all = {name: rows[0][name] for name in ("alpha", "n", "seed")}
+    at = {f"{name} at {row['pressure']:g}": row.get(name) for name in AT_PRESSURE for row in rows}
+    return of_all | at
 
 
 def table_of(packing: Path, folder: Path) -> str:
@@ -127,7 +156,11 @@ def main(options: Namespace) -> None:
         for name in sorted({table_of(place, folder) for place in packings})
     }
     tables["modes"] = MODES, rows_of(folder.glob("modes/*/*.modes.h5"), told_modes)
+    tables["shears"] = SHEAR, rows_of(folder.glob("shears/*.h5"), told_shear)
     tables["runs"] = RUN, rows_of(folder.glob("runs/*.h5"), told_run)
+    if series := rows_of(folder.glob("series/*.json"), told_series):
+        known_names = dict.fromkeys(name for row in series for name in row if name != "path")
+        tables["series"] = tuple(known_names), series
     for name, (columns, rows) in tables.items():
         known = earlier(options.known / f"{name}.csv") if options.known else []
         lines = [*known, *(cells(row, columns, folder) for row in rows)]

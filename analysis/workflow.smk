@@ -1,4 +1,4 @@
-# What the workflows of both papers share, for Snakemake (https://snakemake.readthedocs.io). `jamshape reproduce` starts
+# What the workflows of all papers share, for Snakemake (https://snakemake.readthedocs.io). `jamshape reproduce` starts
 # them, and the page docs/how-to/reproduce.md tells how; on a cluster one of them is started by itself:
 #
 #   snakemake -s analysis/marschall_2018/reproduce.smk --directory runs/paper --config scale=full \

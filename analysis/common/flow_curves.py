@@ -15,6 +15,7 @@ import numpy as np
 
 from jamshape.arrays import FloatArray
 from jamshape.measures.averages import Mean
+from jamshape.measures.shears import ShearOf
 
 _FEWEST_RATES = 3  # of a curve
 _POWERS = (0.05, 1.2)  # range of b
@@ -97,6 +98,22 @@ def fit_flow_curve(
     error = math.sqrt(max(covariance[0, 0], 0.0)) * scale
     factor = float(c * scale / rates[-1] ** b)
     return FlowCurve(phi, rates, pressures, errors, float(p0 * scale), error, factor, float(b))
+
+
+def curves_of(runs: Sequence[ShearOf]) -> list[FlowCurve]:
+    """Fit a curve to each packing fraction; samples that differ in their seed are points of their own."""
+    by_phi: dict[float, list[ShearOf]] = {}
+    for one in runs:
+        by_phi.setdefault(one.ensemble.phi, []).append(one)
+    curves = []
+    for phi, of in sorted(by_phi.items()):
+        means = [one.steady["pressure"] for one in of if one.steady]
+        rates = np.array([one.ensemble.gdot for one in of])
+        values, errors = (
+            np.array([getattr(m, name) for m in means]) for name in ("value", "error")
+        )
+        curves.append(fit_flow_curve(phi, rates, values, errors))
+    return curves
 
 
 class ShearOnset(NamedTuple):

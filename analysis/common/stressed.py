@@ -6,7 +6,7 @@ import json
 import os
 import warnings
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -21,8 +21,8 @@ from jamshape.landscape import Landscape, State
 from jamshape.minima.target import TargetError
 from jamshape.recording.workers import Workers
 from jamshape.shapes.particles import Particles
-from jamshape.vibration.elasticity import moduli
-from jamshape.vibration.hessian import NotAtMinimumError, dynamical_matrix
+from jamshape.vibration.elasticity import Moduli, moduli
+from jamshape.vibration.hessian import DynamicalMatrix, NotAtMinimumError, dynamical_matrix
 
 SEED = 1  # of the bootstrap
 DRAWS = 1000
@@ -30,6 +30,11 @@ DRAWS = 1000
 # Modules of workers lie in a folder that Python does not know.
 _HERE = str(Path(__file__).parents[1])
 _COMPRESSED = "common.stressed:compressed"
+FOLLOWED = "common.stressed:followed"
+
+# Relative step of the pressure to the same contacts: far less than between changes of contacts, and the change of G is
+# far above the bounds of both.
+STEP = 1e-3
 
 
 class Series(NamedTuple):
@@ -82,20 +87,72 @@ def pressures_of(options: Namespace) -> tuple[float, ...]:
 
 def compressed(*series: Any) -> list[dict[str, Any]]:
     """Make the packing of a `Series` at its lowest pressure, raise the pressure, and measure at each."""
-    of, rows = Series(*series), []
+    return rows_along(Series(*series), lambda packing, _: measured(packing))
+
+
+def rows_along(
+    of: Series, measure: Callable[[js.Packing, float], dict[str, Any]]
+) -> list[dict[str, Any]]:
+    """Measure the packing of a series at each of its pressures, by a function of the packing and the pressure."""
+    rows = []
     packing: js.Packing | None = None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NotReachedWarning)  # rows tell
         for p in of.pressures:
             try:
-                packing = _led(packing, of, p)
-                rows.append({"pressure": p, **measured(packing)})
+                packing = led(packing, of, p)
+                rows.append({"pressure": p, **measure(packing, p)})
             except (TargetError, NotAtMinimumError) as error:  # the latter on a kink of the energy
                 rows.append({"pressure": p, "reached": False, "failure": str(error)})
     return rows
 
 
-def _led(packing: js.Packing | None, of: Series, pressure: float) -> js.Packing:
+def followed(*series: Any) -> list[dict[str, Any]]:
+    """Do as `compressed`, and measure dG/dp with the same contacts at each pressure (`slope_of`)."""
+    of = Series(*series)
+    told = {"alpha": of.alpha, "n": of.n, "seed": of.seed}
+    return [told | row for row in rows_along(of, lambda packing, p: _with_slope(packing, of, p))]
+
+
+def _with_slope(packing: js.Packing, of: Series, pressure: float) -> dict[str, Any]:
+    found = measured(packing)
+    if not found["reached"]:
+        return found
+    try:
+        return found | slope_of(packing, led(packing, of, pressure * (1 + STEP)))
+    except (TargetError, NotAtMinimumError):
+        return found  # only the slope is missing
+
+
+def slope_of(packing: js.Packing, other: js.Packing) -> dict[str, Any]:
+    """Measure dG/dp between two pressures of a packing.
+
+    Returns
+    -------
+    dict
+        ``same_contacts``, and where it is true ``slope`` with its bound: that of both moduli.
+    """
+    if not other.reached:
+        return {}
+    states = [(of.pressure, *elasticity_of(of)) for of in (packing, other)]
+    (p, matrix, elastic), (above, matrix_above, elastic_above) = states
+    same = contacts_of(matrix) == contacts_of(matrix_above)
+    if not same:
+        return {"same_contacts": False}
+    G, G_above = elastic.simple_shear, elastic_above.simple_shear
+    slope = (G_above.relaxed - G.relaxed) / (above - p)
+    bound = (G.bound + G_above.bound) / (above - p)
+    return {"same_contacts": True, "slope": slope, "slope_bound": bound}
+
+
+def contacts_of(matrix: DynamicalMatrix) -> set[tuple[int, ...]]:
+    """List the bonds: both particles, and which bond of theirs it is."""
+    columns = np.column_stack([matrix.bonds.particles, matrix.bonds.slot])
+    return set(map(tuple, columns.tolist()))
+
+
+def led(packing: js.Packing | None, of: Series, pressure: float) -> js.Packing:
+    """Relax a packing at a pressure; None makes that of the series."""
     if packing is not None:
         return js.minimise(packing, pressure=pressure, box=of.box, progress=False)
     particles = Particles.of(alpha=of.alpha)
@@ -109,9 +166,7 @@ def measured(packing: js.Packing) -> dict[str, Any]:
     found: dict[str, Any] = {"reached": packing.reached, "phi": packing.phi, "u": packing.u}
     if not packing.reached:
         return found
-    landscape, state = Landscape(packing), State.of(packing)
-    matrix = dynamical_matrix(landscape, state)
-    elastic = moduli(matrix, at=(landscape, state))
+    matrix, elastic = elasticity_of(packing)
     named = {
         "G": elastic.simple_shear, "G_dc": elastic.B.G_dc, "G_min": elastic.B.G_min, "K": elastic.bulk,
     }  # fmt: skip
@@ -122,6 +177,13 @@ def measured(packing: js.Packing) -> dict[str, Any]:
         "n_floppy": elastic.n_floppy, "n_negative": elastic.n_negative,
         "is_stable": elastic.is_stable_to_shear,
     }  # fmt: skip
+
+
+def elasticity_of(packing: js.Packing) -> tuple[DynamicalMatrix, Moduli]:
+    """Find the dynamical matrix of a packing and its moduli."""
+    landscape, state = Landscape(packing), State.of(packing)
+    matrix = dynamical_matrix(landscape, state)
+    return matrix, moduli(matrix, at=(landscape, state))
 
 
 class Task(Protocol):

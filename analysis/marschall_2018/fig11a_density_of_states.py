@@ -92,7 +92,7 @@ def draw_curve(row: Sides, samples: list[ModeTable], edges: FloatArray, **style:
 
 def draw(tables: Tables, options: Namespace) -> None:
     """Draw all curves."""
-    figure = figure_of(7, 4.2)
+    figure = figure_of(7, 4.2, dpi=125)
     (row,) = add_sides(figure, tables)
     edges, labels = bin_edges(every(tables)), key_labels(tables)
     least = min(

@@ -21,31 +21,15 @@ import numpy as np
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import ensemble_text, pressure_unit
-from jamshape.measures.shears import Sheared, ShearOf, read_shear
+from jamshape.measures.shears import Sheared, read_shear
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.axes import figure_of
-from common.flow_curves import FlowCurve, ShearOnset, fit_flow_curve, shear_onset, yielded
+from common.flow_curves import FlowCurve, ShearOnset, curves_of, shear_onset, yielded
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-
-def curves_of(runs: list[ShearOf]) -> list[FlowCurve]:
-    """Fit a curve to each packing fraction; samples that differ in their seed are points of their own."""
-    by_phi: dict[float, list[ShearOf]] = {}
-    for one in runs:
-        by_phi.setdefault(one.ensemble.phi, []).append(one)
-    curves = []
-    for phi, of in sorted(by_phi.items()):
-        means = [one.steady["pressure"] for one in of if one.steady]
-        rates = np.array([one.ensemble.gdot for one in of])
-        values, errors = (
-            np.array([getattr(m, name) for m in means]) for name in ("value", "error")
-        )
-        curves.append(fit_flow_curve(phi, rates, values, errors))
-    return curves
 
 
 def flow_curve_figure(curves: Sequence[FlowCurve], onset: ShearOnset, of: Sheared) -> Figure:

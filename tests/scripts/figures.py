@@ -11,7 +11,7 @@ from matplotlib.text import Text
 NO_PACKINGS = ("fig02_shapes",)  # of single particles
 
 # What tells under which conditions packings were made; u on an axis has values of its own.
-CONDITIONS = (r"\kappa", "u_0", "u=U/L")
+CONDITIONS = (r"\kappa", "u_0", "u=U/L", "compressed to $p$", r"\dot\gamma")
 
 
 def require_told(script, figure):

@@ -217,3 +217,10 @@ def test_what_was_not_measured_here_is_taken_from_an_earlier_table(folder, repor
     with out.with_name("jobs.csv").open(newline="") as file:
         jobs = {row["job"]: row["seconds"] for row in csv.DictReader(file)}
     assert jobs == {"fig02": "3.0", "fig05": "2.5", "rods_alpha4": "60.0"}
+
+
+def test_a_fraction_of_nothing_is_not_measured():
+    script = runpy.run_path(str(ANALYSIS / SCRIPT))
+    fraction = script["Published"]("rods", "Abstract", 1.0, 0.0, "onsets/found", "onsets/rods", "")
+    assert script["ours_of"]({"onsets": {"found": 0, "rods": 0}}, fraction) is None
+    assert script["ours_of"]({"onsets": {"found": 3, "rods": 4}}, fraction).value == 0.75

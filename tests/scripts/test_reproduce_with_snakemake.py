@@ -57,7 +57,7 @@ def drawn(names):
 def test_every_figure_of_the_paper_is_planned_at_every_scale(folder, scale, tmp_path):
     names, said = planned(folder, scale, tmp_path)
     scripts = listed(folder)
-    assert len(scripts) > 1
+    assert scripts
     assert {
         name for name in scripts if f"{folder}/{name}" not in said
     } == scripts.keys() & NO_FIGURES

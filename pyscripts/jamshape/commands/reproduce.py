@@ -4,6 +4,10 @@
     jamshape reproduce yuan-2019 --scale small --jobs 2 --out runs/yuan
     jamshape reproduce yuan-2019 --scale full --samples 2 --figures fig03 fig05
     jamshape reproduce vanderwerf-2018 --scale small
+    jamshape reproduce zhang-2021
+    jamshape reproduce marschall-shear
+    jamshape reproduce brito-2018
+    jamshape reproduce rocks-hoy-2023
 
 The scale `demo` takes minutes on two cores, `small` an hour, and `full`, with the papers' sizes, several hours.
 The last output is agreement.md, a page with every number beside the paper's, the figures, and a list of runs.
@@ -38,7 +42,10 @@ from jamshape.front.progress import follow
 from jamshape.recording.driver import Told
 from jamshape.recording.workers import cores, python_path
 
-PAPERS = ("marschall-2018", "yuan-2019", "vanderwerf-2018")
+PAPERS = (
+    "marschall-2018", "yuan-2019", "vanderwerf-2018", "zhang-2021", "marschall-shear", "brito-2018",
+    "rocks-hoy-2023",
+)  # fmt: skip
 SCALES = ("demo", "small", "full")
 
 GO_ON = "the same command makes what is missing"

@@ -1,0 +1,88 @@
+"""Contacts and forces of nearly round particles, on a small sweep made here and on numbers that are known."""
+
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pictures import image
+
+import jamshape as js
+
+FOLDER = "brito_2018"
+ANALYSIS = Path(__file__).parents[2] / "analysis"
+W1 = (0.95, 0.9, 0.8)
+
+
+@pytest.fixture(scope="module")
+def sweep(tmp_path_factory):
+    """Two packings of discs and of each ellipse."""
+    folder = tmp_path_factory.mktemp("nearly_round")
+    shapes = [js.Spherocylinders(alpha=0.0)]
+    shapes += [js.Superellipsoids(p=1, w1=w1, w2=1, size_ratio=1.4) for w1 in W1]
+    for k, shape in enumerate(shapes):
+        for seed in (1, 2):
+            file = folder / f"{k}_{seed}.h5"
+            js.make_packing(
+                shape, n=24, seed=seed, dimension=2, u0=1e-15, file=file, progress=False
+            )
+    return folder
+
+
+def test_contacts_above_those_of_discs(report, sweep, tmp_path):
+    out = tmp_path / "c.png"
+    found = report(f"{FOLDER}/contacts.py", sweep, "--out", out)
+    image(out)
+    Deltas = sorted(row["Delta"] for row in found["shapes"])
+    assert Deltas == pytest.approx([1 / w1 - 1 for w1 in W1])
+    assert found["packings"] == found["hypostatic"] == 6
+    [fit] = found["powers"]
+    assert fit["family"] == "ellipses in 2D"
+    assert fit["x"] > 0
+
+
+def test_contacts_need_round_particles(problem, sweep, tmp_path):
+    ellipses = [sweep / f"{k}_1.h5" for k in (1, 2)]
+    assert "of round particles" in problem(
+        f"{FOLDER}/contacts.py", *ellipses, "--out", tmp_path / "x.png"
+    )
+
+
+def test_forces_of_each_shape(report, sweep, tmp_path):
+    out = tmp_path / "f.png"
+    found = report(f"{FOLDER}/forces.py", sweep, "--out", out)
+    image(out)
+    Deltas = sorted(row["Delta"] for row in found["forces"])
+    assert Deltas == pytest.approx([0, *sorted(1 / w1 - 1 for w1 in W1)], abs=1e-8)
+    assert all(row["bonds"] > 80 for row in found["forces"])
+
+
+@pytest.mark.parametrize("theta", [0.0, 0.175, 0.423])
+def test_exponents_of_forces_are_found(theta, monkeypatch):
+    monkeypatch.syspath_prepend(ANALYSIS / FOLDER)
+    exponent_of = runpy.run_path(str(ANALYSIS / FOLDER / "forces.py"))["exponent_of"]
+    uniform = (np.arange(20000) + 0.5) / 20000
+    found, error = exponent_of(0.2 * uniform ** (1 / (1 + theta)), 0.2)
+    assert found == pytest.approx(theta, abs=1e-3)
+    assert error == pytest.approx((1 + theta) / 20000**0.5, rel=1e-2)
+
+
+def test_powers_of_contacts_are_found(monkeypatch):
+    monkeypatch.syspath_prepend(ANALYSIS / FOLDER)
+    script = runpy.run_path(str(ANALYSIS / FOLDER / "contacts.py"))
+    mean = script["Mean"]
+    points = [
+        script["Point"](None, Delta, mean(0.0), mean(2.5 * Delta**0.5, 0.01), 1, 1)
+        for Delta in (0.01, 0.03, 0.1)
+    ]
+    assert script["power_of"](points)[:2] == pytest.approx((2.5, 0.5))
+
+
+def test_contacts_of_ellipses_against_aspect_ratio(report, sweep, tmp_path):
+    out = tmp_path / "r.png"
+    ellipses = [path for path in sorted(sweep.glob("*.h5")) if not path.name.startswith("0")]
+    found = report("rocks_hoy_2023/aspect_ratio.py", *ellipses, "--out", out)
+    image(out)
+    assert (found["n_shapes"], found["shapes_below_6"]) == (3, 3)
+    by_ratio = {row["aspect_ratio"]["value"]: row for row in found["shapes"]}
+    assert sorted(by_ratio) == pytest.approx([1 / w1 for w1 in W1])
