@@ -211,7 +211,9 @@ def main(options: Namespace) -> None:
     groups = read_groups(options.files, needs=["alpha"], same=("n", "size_ratio", "u0"))
     curves = {}
     for system, curve in curves_over(groups, "alpha").items():
-        z = {name: averages(known, name) for name in MARKS if (known := having(name, curve))}
+        z = {name: averages(curve, name) for name in ("z", "z_single")}
+        if known := having("z_bearing", curve):
+            z["z_bearing"] = averages(known, "z_bearing")
         fits = {name: fit(of, round_z(system), options.largest) for name, of in z.items()}
         curves[system] = Found(z, fits, averages(curve, "n_rattlers"))
     draw(curves, conditions_text(groups), options)
