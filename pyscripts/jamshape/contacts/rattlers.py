@@ -56,11 +56,20 @@ def find_rattlers(packing: Packing, network: ContactNetwork) -> BoolArray:
     return _contact.find_rattlers(packing.n, packing.dimension, pairs, normals, on_face)
 
 
-def coordination(packing: Packing, network: ContactNetwork) -> Coordination:
+def coordination(
+    packing: Packing, network: ContactNetwork, grazing_below: float = GRAZING
+) -> Coordination:
     """Count bonds and contacts per particle, without rattlers and their contacts.
 
     In the plane a side-to-side contact is two bonds, even if `find_contacts` was called with sides=1;
     in 3D bonds are counted as they are, since skew rods touch side to side at one point.
+
+    Parameters
+    ----------
+    packing : Packing
+    network : ContactNetwork
+    grazing_below : float
+        Fraction of the mean force below which a bond grazes.
 
     Returns
     -------
@@ -70,7 +79,7 @@ def coordination(packing: Packing, network: ContactNetwork) -> Coordination:
     rattlers = find_rattlers(packing, network)
     held = ~rattlers[network.pairs].any(axis=1)
     bonds = network.n_bonds[held]
-    grazing = np.bincount(network.bonds.contact[_is_grazing(network)], minlength=len(held))[held]
+    grazing = np.bincount(network.bonds.contact[_is_grazing(network, grazing_below)], minlength=len(held))[held]
     if packing.dimension == 2:
         grazing = np.where(network.kind[held] == ContactKind.SIDE_TO_SIDE, 2 * grazing // bonds, grazing)
         bonds = np.where(network.kind[held] == ContactKind.SIDE_TO_SIDE, 2, bonds)
@@ -88,8 +97,9 @@ def coordination(packing: Packing, network: ContactNetwork) -> Coordination:
     )
 
 
-def _is_grazing(network: ContactNetwork) -> BoolArray:
-    """Flag the bonds weaker than GRAZING of the mean, (B,)."""
+def _is_grazing(network: ContactNetwork, below: float) -> BoolArray:
+    """Flag the bonds weaker than a fraction of the mean, (B,)."""
     force = np.linalg.norm(network.bonds.force, axis=1)
-    found: BoolArray = force < GRAZING * force.mean() if len(force) else np.zeros(0, np.bool_)
+    mean = float(force.mean()) if len(force) else 0.0
+    found: BoolArray = force < below * mean
     return found
