@@ -69,6 +69,7 @@ highlight_language = "none"  # of commands and decks; Python says that it is Pyt
 # Formulas are MathML in the pages: browsers set them without scripts and without the network.
 html_math_renderer = "mathml"
 html_theme = "furo"
+html_static_path = html_css_files = ["style.css"]
 html_title = "jamshape"
 html_show_sourcelink = False
 
@@ -134,11 +135,9 @@ def write_formula(writer: HTML5Translator, node: nodes.math) -> None:
 
 
 def write_equation(writer: HTML5Translator, node: nodes.math_block) -> None:
-    """Write a displayed formula, in a box that scrolls where a screen is narrower."""
+    """Write a displayed formula, in a box that style.css lets scroll."""
     equation = convert(node.astext(), display="block")
-    writer.body.append(
-        f'<div class="math" style="overflow: auto hidden; padding-block: 0.5em">{equation}</div>'
-    )
+    writer.body.append(f'<div class="math">{equation}</div>')
     raise nodes.SkipNode
 
 
