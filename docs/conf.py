@@ -69,7 +69,8 @@ highlight_language = "none"  # of commands and decks; Python says that it is Pyt
 # Formulas are MathML in the pages: browsers set them without scripts and without the network.
 html_math_renderer = "mathml"
 html_theme = "furo"
-html_static_path = html_css_files = ["style.css"]
+html_static_path = ["style.css"]
+html_css_files = ["style.css"]
 html_title = "jamshape"
 html_show_sourcelink = False
 
