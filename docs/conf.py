@@ -129,16 +129,23 @@ class CommandsHelp(SphinxDirective):
         return found
 
 
+_LETTER = re.compile(r"(\\math(?:bf|cal|bb|sf))\s+(\w)")
+
+
+def mathml(node: nodes.math | nodes.math_block, display: str) -> str:
+    r"""Convert a formula; ``\mathbf r`` as ``\mathbf{r}``, which becomes a bold letter and not an attribute browsers ignore."""
+    return convert(_LETTER.sub(r"\1{\2}", node.astext()), display=display)
+
+
 def write_formula(writer: HTML5Translator, node: nodes.math) -> None:
     """Write a formula within a line."""
-    writer.body.append(convert(node.astext()))
+    writer.body.append(mathml(node, "inline"))
     raise nodes.SkipNode
 
 
 def write_equation(writer: HTML5Translator, node: nodes.math_block) -> None:
     """Write a displayed formula, in a box that style.css lets scroll."""
-    equation = convert(node.astext(), display="block")
-    writer.body.append(f'<div class="math">{equation}</div>')
+    writer.body.append(f'<div class="math">{mathml(node, "block")}</div>')
     raise nodes.SkipNode
 
 
