@@ -36,7 +36,7 @@ SHAPE = ("alpha", "exponent", "w1", "w2", "size_ratio", "n", "seed")
 STYLE = ("shape", "dimension")
 PACKING = (
     *STYLE, *SHAPE, "asphericity", "beta", "z_iso", "protocol", "phi_thermal", "n_sweeps", "u0", "u", "pressure", "phi", "phi_J", "z", "z_single",
-    "n_rattlers", "n_bonds", "S2", "S4", "C4", "residual_force", "residual_torque", "tolerance", "outcome", "wall_seconds",
+    "z_bearing", "n_rattlers", "n_bonds", "S2", "S4", "C4", "residual_force", "residual_torque", "tolerance", "outcome", "wall_seconds",
 )  # fmt: skip
 RUN = (
     *SHAPE, "kappa", "phi_start", "phi_end", "method", "phi_unjams", "phi_jams", "frames_minimised",

@@ -2,16 +2,17 @@
 
     python analysis/marschall_2018/fig08_contact_number.py SWEEP [MORE.h5 ...] --out contact_number.png
 
-z counts a side-to-side contact as two bonds, z_single as one; neither counts rattlers. On the right
-is how z goes to its limit at alpha = 0, 4 for discs and 6 for spheres, with a fit of a + b alpha^x to what is above
-it at the four smallest alpha above 0 if they are small enough. Any shapes with an aspect ratio alpha may be given,
-each is a curve. The last line of standard output is one JSON object with the averages over samples and the fits.
+z counts a side-to-side contact as two bonds, z_single as one; z_bearing counts bonds with at least 1e-6 of the mean
+force; none counts rattlers. The right panel shows how z approaches its limit at alpha = 0, 4 for discs and 6 for spheres, with
+a fit of a + b alpha^x to the excess at the four smallest alpha above 0 if they are small enough. Any shapes with an
+aspect ratio alpha may be given, each is a curve. The last line of standard output is one JSON object with the averages over samples and the fits.
 """
 
 from __future__ import annotations
 
 import sys
 from argparse import Namespace
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -21,7 +22,7 @@ from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import SKY
-from jamshape.files.ensembles import System
+from jamshape.files.ensembles import PackingFile, System
 from jamshape.measures.averages import Mean
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -44,9 +45,17 @@ PAPER_FITS = {
 }
 
 FITTED = 4  # of the smallest alpha, as in the paper
-MARKS = {"z": ("o", r"\langle z_J\rangle"), "z_single": ("D", r"\langle\tilde z_J\rangle")}
+MARKS = {
+    "z": ("o", r"\langle z_J\rangle"),
+    "z_single": ("D", r"\langle\tilde z_J\rangle"),
+    "z_bearing": ("s", r"\langle z_J\rangle"),
+}
 
-SIDES = {"z": "side-to-side as two", "z_single": "side-to-side as one"}
+SIDES = {
+    "z": "side-to-side as two",
+    "z_single": "side-to-side as one",
+    "z_bearing": "as two, bonds above 1e-6 of the mean force",
+}
 
 Averages = dict[float, Mean]
 
@@ -112,8 +121,9 @@ def draw(curves: dict[System, Found], title: str, options: Namespace) -> None:
     labels = system_labels(curves)
     for k, (system, found) in enumerate(curves.items()):
         limit = round_z(system)
-        for way, (name, (marker, symbol)) in enumerate(MARKS.items()):
-            tint, text = color(2 * k + way), f", {labels[system]}" * (labels[system] != "")
+        for way, name in enumerate(found.z):
+            marker, symbol = MARKS[name]
+            tint, text = color(len(MARKS) * k + way), f", {labels[system]}" * (labels[system] != "")
             style: dict[str, Any] = {"fmt": marker, "color": tint, "mfc": "none"}
             label = f"${symbol}$, {SIDES[name]}{text}"
             error_bars(linear, found.z[name], discs, **style, label=label)
@@ -174,10 +184,17 @@ def rows(system: System, found: Found) -> list[dict[str, Any]]:
         system.report()
         | {"alpha": alpha, "paper_z": paper[alpha].value if alpha in paper else None}
         | {"paper_rattlers": rattlers.get(alpha)}
-        | {name: values[alpha] for name, values in found.z.items()}
+        | {name: values.get(alpha) for name, values in found.z.items()}
         | {"rattlers": found.rattlers[alpha]}
         for alpha in found.z["z"]
     ]
+
+
+def having(name: str, curve: Mapping[float, list[PackingFile]]) -> dict[float, list[PackingFile]]:
+    """Select the alphas of which all samples have a number, as files of earlier versions do not have all."""
+    return {
+        alpha: files for alpha, files in curve.items() if all(name in f.attributes for f in files)
+    }
 
 
 def fits_of(system: System, found: Found) -> dict[str, Any]:
@@ -194,7 +211,9 @@ def main(options: Namespace) -> None:
     groups = read_groups(options.files, needs=["alpha"], same=("n", "size_ratio", "u0"))
     curves = {}
     for system, curve in curves_over(groups, "alpha").items():
-        z = {name: averages(curve, name) for name in MARKS}
+        z = {name: averages(curve, name) for name in ("z", "z_single")}
+        if known := having("z_bearing", curve):
+            z["z_bearing"] = averages(known, "z_bearing")
         fits = {name: fit(of, round_z(system), options.largest) for name, of in z.items()}
         curves[system] = Found(z, fits, averages(curve, "n_rattlers"))
     draw(curves, conditions_text(groups), options)

@@ -2,7 +2,7 @@
 
     python analysis/marschall_2018/grazing_bonds.py samples/modes.csv
 
-The table is that of sample_tables.py. A bond grazes if it bears less than 1e-4 of the mean force of a bond, as where a
+The table is that of sample_tables.py. A bond grazes if it bears less than 1e-6 of the mean force of a bond, as where a
 rod slid until it met another one. Each takes one mode out of the low band into the high one and adds 2/N' to z, with
 N' particles that are no rattlers; here both are undone. Prints a row for each folder of modes, aspect ratio and energy
 density, with standard errors. The last line of standard output is one JSON object.

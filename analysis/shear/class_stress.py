@@ -1,4 +1,4 @@
-"""Tell which classes of contact carry pressure and shear stress, averaged over frames of the steady state.
+"""Fractions of pressure and shear stress carried by each class of contact, averaged over frames of the steady state.
 
     python analysis/shear/class_stress.py runs/shear/a4_*_g1e-5.h5 --out class_stress.png
 

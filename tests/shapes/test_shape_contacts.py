@@ -224,7 +224,7 @@ def test_two_particles_that_barely_touch_hold_neither(case):
     assert len(network.pairs) == 1
     assert network.n_bonds[0] <= 2
     assert find_rattlers(closer, network).all()
-    assert coordination(closer, network) == (0.0, 0.0, 2, 0, 0)
+    assert coordination(closer, network) == (0.0, 0.0, 0.0, 2, 0, 0, 0)
 
 
 # --- what is refused -----------------------------------------------------------------------------

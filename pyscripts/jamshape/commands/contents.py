@@ -37,7 +37,7 @@ from jamshape.recording.driver import KIND
 from jamshape.vibration.ensembles import TOLD, count_of, of_packing
 from jamshape.vibration.table import ModeTable, holds_modes, read_modes
 
-_OF_CONTACTS = ("pressure", "u", "z", "z_single")
+_OF_CONTACTS = ("pressure", "u", "z", "z_single", "z_bearing")
 _STATE = ("phi", *_OF_CONTACTS, "rattlers")
 _MOST_CUBATIC = 2000  # particles whose cubatic order takes less than a second
 _MADE = ("seed", "kappa", "u0", "protocol", "phi_start", "phi_end", "gdot",

@@ -30,6 +30,7 @@ _LINES = {
         "u {u:.4g}",
         "z {z:.5g}",
         "z_single {z_single:.5g}",
+        "z_bearing {z_bearing:.5g} (bonds above 1e-6 of the mean force)",
         "z_iso {z_iso:.5g}",
         "{rattlers} rattlers",
     ),

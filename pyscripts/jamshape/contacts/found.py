@@ -54,6 +54,11 @@ class Contacts(Record):
         return self.counts.z_single
 
     @property
+    def z_bearing(self) -> float:
+        """Bonds per particle with at least 1e-6 of the mean force, rattlers excluded."""
+        return self.counts.z_bearing
+
+    @property
     def pairs(self) -> IntArray:
         """(M, 2) rows i <= j of the packing; i = j where a particle touches its own periodic image."""
         return self.network.pairs

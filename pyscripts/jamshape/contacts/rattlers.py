@@ -11,6 +11,10 @@ from jamshape.arrays import BoolArray
 from jamshape.contacts.network import ContactKind, ContactNetwork
 from jamshape.packing import Packing
 
+# Bonds weaker than this fraction of the mean force are grazing: particles that slide, until they meet another one, rest on
+# such bonds. Forces of packings at 1e-15 have a gap there, from 1e-6 to 1e-3 and more of the mean.
+GRAZING = 1e-6
+
 
 class Coordination(NamedTuple):
     """Contact numbers without rattlers (Marschall & Teitel 2018, Sec. III C)."""
@@ -19,9 +23,13 @@ class Coordination(NamedTuple):
     """Bonds per particle, a side-to-side contact of two rods in the plane counting as two."""
     z_single: float
     """Contacts per particle."""
+    z_bearing: float
+    """Bonds per particle without grazing ones, which bear less than 1e-6 of the mean force."""
     n_rattlers: int
     n_bonds: int
     n_contacts: int
+    n_grazing: int
+    """Grazing bonds."""
 
 
 def find_rattlers(packing: Packing, network: ContactNetwork) -> BoolArray:
@@ -62,14 +70,26 @@ def coordination(packing: Packing, network: ContactNetwork) -> Coordination:
     rattlers = find_rattlers(packing, network)
     held = ~rattlers[network.pairs].any(axis=1)
     bonds = network.n_bonds[held]
+    grazing = np.bincount(network.bonds.contact[_is_grazing(network)], minlength=len(held))[held]
     if packing.dimension == 2:
+        grazing = np.where(network.kind[held] == ContactKind.SIDE_TO_SIDE, 2 * grazing // bonds, grazing)
         bonds = np.where(network.kind[held] == ContactKind.SIDE_TO_SIDE, 2, bonds)
     n_particles, n_bonds, n_contacts = int((~rattlers).sum()), int(bonds.sum()), int(held.sum())
+    n_grazing = int(grazing.sum())
     per_particle = 2 / max(n_particles, 1)
     return Coordination(
         z=per_particle * n_bonds,
         z_single=per_particle * n_contacts,
+        z_bearing=per_particle * (n_bonds - n_grazing),
         n_rattlers=int(rattlers.sum()),
         n_bonds=n_bonds,
         n_contacts=n_contacts,
+        n_grazing=n_grazing,
     )
+
+
+def _is_grazing(network: ContactNetwork) -> BoolArray:
+    """Flag the bonds weaker than GRAZING of the mean, (B,)."""
+    force = np.linalg.norm(network.bonds.force, axis=1)
+    found: BoolArray = force < GRAZING * force.mean() if len(force) else np.zeros(0, np.bool_)
+    return found

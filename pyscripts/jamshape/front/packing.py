@@ -261,6 +261,11 @@ class Packing(PackingLike):
         return self._contacts.z_single
 
     @property
+    def z_bearing(self) -> float:
+        """Bonds per particle with at least 1e-6 of the mean force, rattlers excluded."""
+        return self._contacts.z_bearing
+
+    @property
     def n_rattlers(self) -> int:
         """Number of rattlers."""
         return self._contacts.counts.n_rattlers

@@ -34,6 +34,7 @@ _SUMMARY = (
         "pressure",
         "z",
         "z_single",
+        "z_bearing",
     ),
     *("z_iso", "n_contacts", "n_bonds", "n_rattlers", "S2", "S4", "C4", "asphericity", "beta"),
     *(
@@ -84,7 +85,8 @@ def measure(landscape: Landscape, minimum: Minimum) -> Measured:
     Measured
         `residual_force` and `residual_torque` are the largest of all non-rattlers over the
         mean bond force (torques also over the length that scales radians); `residual` is the
-        largest of all particles. z counts bonds, z_single contacts.
+        largest of all particles. z counts bonds, z_bearing those that bear at least 1e-6 of the mean
+        force, z_single contacts.
     """
     packing = minimum.state.packing(landscape.particles)
     found = Contacts.of(packing, landscape.k_e, landscape.sides)

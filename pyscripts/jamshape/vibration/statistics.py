@@ -14,6 +14,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu, svds
 
 from jamshape.arrays import FloatArray, IntArray
+from jamshape.contacts.rattlers import GRAZING
 from jamshape.packing import Packing
 from jamshape.vibration.dense_modes import rank_of, rank_tolerance
 from jamshape.vibration.hessian import Coordinates, DynamicalMatrix
@@ -32,9 +33,6 @@ _GAP = 3.0
 
 # Bonds with a larger share than this in further states of self stress belong to them.
 _SHARE = 1e-3
-
-# Bonds weaker than this fraction of the mean force are grazing.
-_GRAZING = 1e-4
 
 # Singular values are computed for up to this number of bonds or coordinates, in a second.
 _DENSE = 1500
@@ -216,7 +214,7 @@ def count(matrix: DynamicalMatrix, found: Spectrum) -> Counts:
     rank = found.rank(matrix.residual.largest)
     sigma, n_moves = found.singular_values, matrix.translations.shape[1]
     force = matrix.contacts["bond_force"]
-    n_grazing = int(((force > 0) & (force < _GRAZING * matrix.bond_force)).sum())
+    n_grazing = int(((force > 0) & (force < GRAZING * matrix.bond_force)).sum())
     return Counts(
         n_modes=matrix.size,
         n_translations=n_moves,

@@ -81,7 +81,7 @@ def test_disc_that_touches_its_own_images():
     np.testing.assert_allclose(found.force, 0, rtol=0, atol=1e-15)
     np.testing.assert_allclose(found.virial, np.diag([0.9 * 0.3, 0.8 * 0.6]), rtol=1e-13, atol=0)
     assert not find_rattlers(packing, network)[0]
-    assert coordination(packing, network) == (4, 4, 0, 2, 2)
+    assert coordination(packing, network) == (4, 4, 4, 0, 2, 2, 0)
 
 
 def test_two_images_of_one_neighbour():
@@ -100,8 +100,17 @@ def test_side_to_side_counts_as_two_bonds(sides):
     network = find_contacts(packing, 1.0, sides)
     assert find_rattlers(packing, network).tolist() == [False, False, True, True]
     found = coordination(packing, network)
-    assert found == (4, 2, 2, 4, 2)
+    assert found == (4, 2, 4, 2, 4, 2, 0)
     assert found.n_bonds == 2 * found.n_contacts
+
+
+@pytest.mark.parametrize("sides", SIDES)
+def test_bonds_that_bear_next_to_nothing_graze(sides):
+    rods = make([[0.5, 5], [1.3, 5]], np.pi / 2, edges=(1.8 - 1e-8, 20.0))  # 0.8 apart, and nearly 1
+    found = coordination(rods, find_contacts(rods, 1.0, sides))
+    assert (found.z, found.z_bearing, found.n_bonds, found.n_grazing) == (4, 2, 4, 2)
+    disc = make([[0.3, 0.3]], 0.0, half_length=0.0, edges=(0.9, 1 - 1e-5))
+    assert coordination(disc, find_contacts(disc, 1.0, sides)).n_grazing == 0
 
 
 def test_rods_that_are_pressed_by_tips_on_one_side_are_rattlers():
@@ -115,7 +124,7 @@ def test_cubic_crystal_of_one_sphere():
     unit = random_packing(1, 0.1, 1, monodisperse(0), dimension=3)
     packing = unit.with_(box=Box(lo=np.zeros(3), edges=np.full(3, 0.9)))
     network = find_contacts(packing)
-    assert coordination(packing, network) == (6, 6, 0, 3, 3)
+    assert coordination(packing, network) == (6, 6, 6, 0, 3, 3, 0)
     assert sum_forces(packing, network).pressure == pytest.approx(0.1 / 0.9**2)
 
 
@@ -129,7 +138,7 @@ def test_without_contacts(dimension):
     assert not found.force.any()
     assert not found.torque.any()
     assert find_rattlers(packing, network).all()
-    assert coordination(packing, network) == (0, 0, 10, 0, 0)
+    assert coordination(packing, network) == (0, 0, 0, 10, 0, 0, 0)
 
 
 def test_refuses():
