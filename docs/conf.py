@@ -69,6 +69,8 @@ highlight_language = "none"  # of commands and decks; Python says that it is Pyt
 # Formulas are MathML in the pages: browsers set them without scripts and without the network.
 html_math_renderer = "mathml"
 html_theme = "furo"
+html_static_path = ["style.css"]
+html_css_files = ["style.css"]
 html_title = "jamshape"
 html_show_sourcelink = False
 
@@ -127,18 +129,23 @@ class CommandsHelp(SphinxDirective):
         return found
 
 
+_LETTER = re.compile(r"(\\math(?:bf|cal|bb|sf))\s+(\w)")
+
+
+def mathml(node: nodes.math | nodes.math_block, display: str) -> str:
+    r"""Convert a formula; ``\mathbf r`` as ``\mathbf{r}``, which becomes a bold letter and not an attribute browsers ignore."""
+    return convert(_LETTER.sub(r"\1{\2}", node.astext()), display=display)
+
+
 def write_formula(writer: HTML5Translator, node: nodes.math) -> None:
     """Write a formula within a line."""
-    writer.body.append(convert(node.astext()))
+    writer.body.append(mathml(node, "inline"))
     raise nodes.SkipNode
 
 
 def write_equation(writer: HTML5Translator, node: nodes.math_block) -> None:
-    """Write a displayed formula, in a box that scrolls where a screen is narrower."""
-    equation = convert(node.astext(), display="block")
-    writer.body.append(
-        f'<div class="math" style="overflow: auto hidden; padding-block: 0.5em">{equation}</div>'
-    )
+    """Write a displayed formula, in a box that style.css lets scroll."""
+    writer.body.append(f'<div class="math">{mathml(node, "block")}</div>')
     raise nodes.SkipNode
 
 

@@ -1,9 +1,9 @@
-"""
+r"""
 Compression at a rate, and the onset of jamming
 ===============================================
 
-Overdamped rods are compressed at the rate kappa in LAMMPS. A fit of p(phi) gives phi_J(kappa), which for flowing rods lies below
-the packing fraction at which frames of the run stay jammed when they are minimised. The figure shows both.
+Overdamped rods are compressed at the rate :math:`\kappa` in LAMMPS. A fit of :math:`p(\phi)` gives :math:`\phi_J(\kappa)`, which for
+flowing rods lies below the packing fraction at which frames of the run stay jammed when they are minimised. The figure shows both.
 """
 
 import jamshape as js

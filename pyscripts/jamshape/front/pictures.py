@@ -90,7 +90,7 @@ def plot(
     if axes is None:
         import matplotlib.pyplot as plt  # noqa: PLC0415 - not needed where axes are given
 
-        axes = plt.figure(figsize=_size(thing), layout="constrained").add_subplot()
+        axes = plt.figure(figsize=_size(thing), layout="compressed").add_subplot()
     _require_plane(axes)
     _draw(thing, axes, color)
     return axes
@@ -100,7 +100,7 @@ def html(thing: PackingLike | Recorded | Modes) -> str:
     """Return HTML for notebooks: the repr and a picture."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - only notebooks ask
 
-    figure = Figure(figsize=_size(thing), layout="constrained")
+    figure = Figure(figsize=_size(thing), layout="compressed")
     _draw(thing, figure.add_subplot(), "kind")
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=_DPI, bbox_inches="tight")

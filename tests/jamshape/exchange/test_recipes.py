@@ -45,7 +45,7 @@ def folder(request, tmp_path, monkeypatch):
 
 
 def test_every_recipe_is_tried():
-    assert len(RECIPES) == TEXT.count("```python") == 7
+    assert len(RECIPES) == TEXT.count("```python") == 8
     assert {param.values[0] for param in RECIPES} == set(NEEDS)
 
 

@@ -1,9 +1,11 @@
 """The front door: what it loads when, how it goes on from files, what it says and shows."""
 
+import io
 import subprocess
 import sys
 
 import h5py
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -204,6 +206,21 @@ def test_plots_are_drawn_where_they_shall_be(run, color):
     assert js.plot(run.packing(), axes, color=color) is axes
     assert "N=16" in axes.get_title()
     assert axes.collections
+
+
+@pytest.mark.lammps
+@pytest.mark.parametrize("color", ["kind", "orientation", "nematic"])
+def test_a_saved_picture_holds_title_and_legend(run, color):
+    axes = js.plot(run.packing(), color=color)
+    figure = axes.figure
+    figure.savefig(io.BytesIO())
+    for shown in (axes.title, axes.get_legend(), axes.patch):
+        box = shown.get_window_extent()
+        assert figure.bbox.x0 <= box.x0
+        assert figure.bbox.y0 <= box.y0
+        assert box.x1 <= figure.bbox.x1
+        assert box.y1 <= figure.bbox.y1
+    plt.close(figure)
 
 
 def test_what_cannot_be_drawn_is_named():
