@@ -18,7 +18,7 @@ ANALYSIS = Path(__file__).parents[2] / "analysis"
 FOLDERS = [paper.replace("-", "_") for paper in PAPERS]
 
 # These put numbers beside the paper's and draw nothing.
-NO_FIGURES = {"beside_paper.py", "grazing_bonds.py"}
+NO_FIGURES = {"beside_paper.py", "force_gap.py", "grazing_bonds.py"}
 
 
 def planned(folder, scale, tmp_path):

@@ -77,11 +77,15 @@ def coordination(
         With z = 0 if all particles are rattlers.
     """
     rattlers = find_rattlers(packing, network)
-    held = ~rattlers[network.pairs].any(axis=1)
+    held = ~(rattlers[network.pairs[:, 0]] | rattlers[network.pairs[:, 1]])
     bonds = network.n_bonds[held]
-    grazing = np.bincount(network.bonds.contact[_is_grazing(network, grazing_below)], minlength=len(held))[held]
+    grazing = np.bincount(
+        network.bonds.contact[_is_grazing(network, grazing_below)], minlength=len(held)
+    )[held]
     if packing.dimension == 2:
-        grazing = np.where(network.kind[held] == ContactKind.SIDE_TO_SIDE, 2 * grazing // bonds, grazing)
+        grazing = np.where(
+            network.kind[held] == ContactKind.SIDE_TO_SIDE, 2 * grazing // bonds, grazing
+        )
         bonds = np.where(network.kind[held] == ContactKind.SIDE_TO_SIDE, 2, bonds)
     n_particles, n_bonds, n_contacts = int((~rattlers).sum()), int(bonds.sum()), int(held.sum())
     n_grazing = int(grazing.sum())

@@ -35,7 +35,17 @@ OUTCOMES = (*(one.value for one in Outcome), FAILED)
 """Outcomes by their number in the file."""
 
 _NUMBERS = (
-    *("phi", "phi_J", "pressure", "u", "energy_per_particle", "z", "z_single", "z_bearing", "z_iso"),
+    *(
+        "phi",
+        "phi_J",
+        "pressure",
+        "u",
+        "energy_per_particle",
+        "z",
+        "z_single",
+        "z_bearing",
+        "z_iso",
+    ),
     *("n_contacts", "n_bonds", "n_rattlers", "n_negative", "S2", "S4", "C4"),
     *("residual", "evaluations", "wall_seconds"),
 )

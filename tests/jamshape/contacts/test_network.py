@@ -106,7 +106,9 @@ def test_side_to_side_counts_as_two_bonds(sides):
 
 @pytest.mark.parametrize("sides", SIDES)
 def test_bonds_that_bear_next_to_nothing_graze(sides):
-    rods = make([[0.5, 5], [1.3, 5]], np.pi / 2, edges=(1.8 - 1e-8, 20.0))  # 0.8 apart, and nearly 1
+    rods = make(
+        [[0.5, 5], [1.3, 5]], np.pi / 2, edges=(1.8 - 1e-8, 20.0)
+    )  # 0.8 apart, and nearly 1
     found = coordination(rods, find_contacts(rods, 1.0, sides))
     assert (found.z, found.z_bearing, found.n_bonds, found.n_grazing) == (4, 2, 4, 2)
     disc = make([[0.3, 0.3]], 0.0, half_length=0.0, edges=(0.9, 1 - 1e-5))

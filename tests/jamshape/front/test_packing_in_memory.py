@@ -104,9 +104,7 @@ def test_a_time_limit_says_what_would_keep_the_work(nowhere):
 
 @pytest.mark.lammps
 def test_a_time_limit_in_lammps_names_no_temporary_file(nowhere):
-    said = (
-        "^stopped after 0 s in the compression, expected the end; with a file the same call resumes it"
-    )
+    said = "^stopped after 0 s in the compression, expected the end; with a file the same call resumes it"
     with pytest.raises(TimeLimitError, match=said):
         make(IN_LAMMPS["dynamics"], seconds=0.0)
     assert not list(nowhere.iterdir())
