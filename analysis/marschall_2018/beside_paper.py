@@ -65,9 +65,9 @@ def rows_of_packings(paths: list[Path]) -> tuple[int, list[Row]]:
         msg = f"{files[0].path} and {others[0][1][0].path} are of different particles, expected samples"
         raise ValueError(msg)
     alpha, u0, n = alpha_of(system), files[0].number("u0"), n_of(groups)
-    phi_J, z, rattlers = (
+    phi_J, z, bearing, rattlers = (
         mean_over(files, [file.number(name) for file in files])
-        for name in ("phi_J", "z", "n_rattlers")
+        for name in ("phi_J", "z", "z_bearing", "n_rattlers")
     )
     beyond = mean([file.number("phi") - file.number("phi_J") for file in files]).value
     distance = published.DISTANCE.get(alpha, {}).get(u0)
@@ -75,14 +75,15 @@ def rows_of_packings(paths: list[Path]) -> tuple[int, list[Row]]:
     here = (
         (f"phi_J, u0 = {u0:g} to 0", phi_J.text(), number(published.PHI_J.get(alpha, NONE))),
         (f"phi - phi_J at u0 = {u0:g}", f"{beyond:.2g}", f"{distance:.2g}" if distance else ""),
-        ("z", z.text(), number(published.Z.get(alpha, NONE))),
+        ("z of all bonds", z.text(), ""),
+        ("z of bonds above 1e-6 of the mean", bearing.text(), number(published.Z.get(alpha, NONE))),
         ("rattlers", percent(rattlers.value, n), "" if few is None else percent(few, published.N)),
     )
     return n, [Row(name, len(files), *numbers) for name, *numbers in here]
 
 
 def rows_of_modes(paths: list[Path]) -> tuple[int, list[Row]]:
-    """Tell N and the fractions of modes in the bands."""
+    """Tell N, the fractions of modes in the bands, and that of sliding modes without grazing bonds, each of which stops one."""
     ((key, tables),) = read_tables(paths).items()
     known = published.BANDS.get(alpha_of(key.system), {})
     rows = []
@@ -90,6 +91,11 @@ def rows_of_modes(paths: list[Path]) -> tuple[int, list[Row]]:
         share = mean([fraction_of(t, band) for t in tables])
         paper = f"{known[band]:.4f}" if known else ""
         rows.append(Row(f"modes in the {band} band", len(tables), share.text(), paper))
+    whole = [t for t in tables if "n_grazing" in t.attributes]
+    stopped = [t.attributes["n_grazing"] / t.n_vibrational for t in whole]
+    low = mean([fraction_of(t, "low") + n for t, n in zip(whole, stopped, strict=True)])
+    paper = f"{known['low']:.4f}" if known else ""
+    rows.append(Row("low band without bonds below 1e-6", len(whole), low.text(), paper))
     return int(tables[0].attributes["n"]), rows
 
 

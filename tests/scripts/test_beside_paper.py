@@ -41,12 +41,17 @@ def test_a_run_of_which_little_is_known(report, tmp_path):
 
 
 def test_a_packing_and_its_modes(report, packing, tmp_path):
-    js.modes(packing).save(tmp_path / "modes.h5")
+    modes = js.modes(packing)
+    modes.save(tmp_path / "modes.h5")
     found = report(BESIDE, "--packing", packing, "--modes", tmp_path / "modes.h5")
     assert found["n"] == [24]
     rows, stored = rows_of(found), read_attributes(packing)
-    assert float(rows["z"][0]) == pytest.approx(stored["z"], abs=1e-3)
-    assert rows["z"][1] == "5.640 +- 0.010"
+    assert float(rows["z of all bonds"][0]) == pytest.approx(stored["z"], abs=1e-3)
+    bearing, paper = rows["z of bonds above 1e-6 of the mean"]
+    assert (float(bearing), paper) == (
+        pytest.approx(stored["z_bearing"], abs=1e-3),
+        "5.640 +- 0.010",
+    )
     assert float(rows["phi_J, u0 = 1e-11 to 0"][0]) == pytest.approx(stored["phi_J"], abs=1e-4)
     assert rows["phi - phi_J at u0 = 1e-11"][1] == "9.3e-06"
     assert rows["rattlers"][1] == "0.12 %"
@@ -54,6 +59,9 @@ def test_a_packing_and_its_modes(report, packing, tmp_path):
         assert rows[f"modes in the {band} band"][1] == f"{part:.4f}"
     shares = [float(rows[f"modes in the {band} band"][0]) for band in published.BANDS[4.0]]
     assert sum(shares) == pytest.approx(1, abs=2.1 / 72)  # less two translations
+    stopped = modes.table.attributes["n_grazing"] / modes.table.n_vibrational
+    low, paper = rows["low band without bonds below 1e-6"]
+    assert (float(low), paper) == (pytest.approx(shares[0] + stopped, abs=1e-3), "0.0638")
 
 
 def test_files_are_asked_for(problem):

@@ -11,7 +11,9 @@ SCRIPT = "marschall_2018/force_gap.py"
 def test_bonds_below_the_smallest_force_do_not_count(report, tmp_path):
     for seed in (1, 2):
         particles = js.Spherocylinders(alpha=2)
-        js.make_packing(particles, n=16, u0=1e-6, seed=seed, progress=False, file=tmp_path / f"{seed}.h5")
+        js.make_packing(
+            particles, n=16, u0=1e-6, seed=seed, progress=False, file=tmp_path / f"{seed}.h5"
+        )
     (row,) = report(SCRIPT, tmp_path, "--least", 1e-6, 0.5)["rows"]
     assert (row["alpha"], row["samples"]) == (2, 2)
     expected = []
@@ -21,7 +23,9 @@ def test_bonds_below_the_smallest_force_do_not_count(report, tmp_path):
         held = ~packing.rattlers[contacts.pairs].any(axis=1)
         force = np.linalg.norm(contacts.bonds.force, axis=1)
         strong = held[contacts.bonds.contact] & (force >= 0.5 * force.mean())
-        expected.append((packing.z, packing.z_bearing, 2 * strong.sum() / (~packing.rattlers).sum()))
+        expected.append(
+            (packing.z, packing.z_bearing, 2 * strong.sum() / (~packing.rattlers).sum())
+        )
     found = [z["value"] for z in row["z"]]
     assert found == pytest.approx(np.mean(expected, axis=0))
     assert found[2] < found[0]
