@@ -113,10 +113,10 @@ def test_the_demo_draws_what_it_says_and_puts_its_numbers_beside_the_papers(tmp_
         assert f"   {name}.png" in done.stdout
     found = re.findall(r"^   (\w.*?)  +(\d)  +(.+)$", done.stdout, re.MULTILINE)
     rows = {name: numbers for name, _, numbers in found}
-    assert {name: samples for name, samples, _ in found}["z"] == "2"
+    assert {name: samples for name, samples, _ in found}["z of all bonds"] == "2"
     assert rows["phi_J(kappa = 1e-05), p to 0"].endswith("0.866")
     assert 0.7 < float(rows["phi_J, u0 = 1e-15 to 0"].split()[0]) < 0.95
-    assert 5 < float(rows["z"].split()[0]) < 6.5
+    assert 5 < float(rows["z of all bonds"].split()[0]) < 6.5
     bands = [
         float(rows[f"modes in the {band} band"].split()[0]) for band in ("low", "middle", "high")
     ]
