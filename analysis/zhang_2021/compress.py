@@ -2,10 +2,10 @@
 
     python analysis/zhang_2021/compress.py --alpha 1 --n 64 --first-seed 1 --samples 20 --runs series
 
-Each packing is made at the lowest pressure, in a box that changes its volume only, and led to one pressure after the other
-(`analysis/stress/moduli_scaling.py`). At each of them it is also led to a pressure that is higher by 1e-3 of it: where that
+Each packing is made at the lowest pressure, in a box that changes its volume only, and brought to one pressure after the other
+(`analysis/stress/moduli_scaling.py`). At each of them it is also brought to a pressure that is higher by 1e-3 of it: where that
 opens and closes no contact, both moduli give dG/dp along the geometrical family. Writes a file (JSON) for each seed to
---runs; a command that was stopped and is repeated goes on. The last line of standard output is one JSON object.
+--runs; the same command resumes after a kill. The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations

@@ -196,7 +196,7 @@ def of_vicinity(fuzz, of, dimension, poses):
                         "NewtonSystem.solve", system.solve, right=np.ones((1, n)), accuracy=1e-3
                     )
                 elif name == "learn":
-                    fuzz.call("NewtonSystem.learn", system.learn, part=2, has_closed=True)
+                    fuzz.call("NewtonSystem.learn", system.learn, part=0.5, has_closed=True)
                 elif name == "prepare":
                     fuzz.call("NewtonSystem.prepare", system.prepare)
                 else:

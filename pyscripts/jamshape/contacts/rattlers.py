@@ -80,7 +80,7 @@ def coordination(
     held = ~(rattlers[network.pairs[:, 0]] | rattlers[network.pairs[:, 1]])
     bonds = network.n_bonds[held]
     grazing = np.bincount(
-        network.bonds.contact[_is_grazing(network, grazing_below)], minlength=len(held)
+        network.bonds.contact[_is_grazing(network, held, grazing_below)], minlength=len(held)
     )[held]
     if packing.dimension == 2:
         grazing = np.where(
@@ -101,9 +101,9 @@ def coordination(
     )
 
 
-def _is_grazing(network: ContactNetwork, below: float) -> BoolArray:
-    """Flag the bonds weaker than a fraction of the mean, (B,)."""
+def _is_grazing(network: ContactNetwork, held: BoolArray, below: float) -> BoolArray:
+    """Flag the bonds weaker than a fraction of the mean of those without rattlers, (B,)."""
     force = np.linalg.norm(network.bonds.force, axis=1)
-    mean = float(force.mean()) if len(force) else 0.0
-    found: BoolArray = force < below * mean
+    counted = force[held[network.bonds.contact]]
+    found: BoolArray = force < below * float(counted.mean() if len(counted) else 0.0)
     return found
