@@ -130,6 +130,7 @@ template <int BLOCK> struct BlockMatrix {
   {
     BlockView at{};
     at.n = static_cast<int>(of.size());
+    at.is_complete = of.fill == Fill::COMPLETE;
     at.first = of.first.data();
     at.row = of.row.data();
     at.first_left = of.first_left.data();

@@ -105,25 +105,111 @@ template <> void Square<3>::put(double *block) const
   std::memcpy(block + 6, &column[2], 3 * sizeof(double));
 }
 
-/// Subtracts from a third block the product of a block and another one, whose (k, c) is part[BLOCK
-/// * k + c].
-template <int BLOCK>
-[[gnu::always_inline]] inline void take_product(const double *a, const double *part, double *from)
-{
-  Square<BLOCK> left, rest;
-  left.load(a);
-  rest.load(from);
-  for (int c = 0; c < BLOCK; ++c) {
-    for (int k = 0; k < BLOCK; ++k) rest.column[c].take(left.column[k], part[BLOCK * k + c]);
+/// A block of a row of the factor times the pivots of its column, transposed: its element (k, c) is
+/// by[BLOCK * k + c].
+template <int BLOCK> struct Part {
+  double by[BLOCK * BLOCK];
+};
+
+/// A block from which products of others are subtracted.
+template <int BLOCK> struct Rest {
+  Square<BLOCK> block;
+
+  void load(const double *from) { block.load(from); }
+  void put(double *to) const { block.put(to); }
+  void take(const double *a, const Part<BLOCK> &part)
+  {
+    Square<BLOCK> left;
+    left.load(a);
+    for (int c = 0; c < BLOCK; ++c) {
+      for (int k = 0; k < BLOCK; ++k) block.column[c].take(left.column[k], part.by[BLOCK * k + c]);
+    }
   }
-  rest.put(from);
-}
+};
+
+// Both columns share a register.
+template <> struct Rest<2> {
+  Four block;
+
+  void load(const double *from) { std::memcpy(&block, from, sizeof(block)); }
+  void put(double *to) const { std::memcpy(to, &block, sizeof(block)); }
+  void take(const double *a, const Part<2> &part)
+  {
+    for (int k = 0; k < 2; ++k) {
+      Two left;
+      std::memcpy(&left, a + 2 * k, sizeof(left));
+      const Four by{part.by[2 * k], part.by[2 * k], part.by[2 * k + 1], part.by[2 * k + 1]};
+      block -= __builtin_shufflevector(left, left, 0, 1, 0, 1) * by;
+    }
+  }
+};
 
 template <int BLOCK> bool is_zero(const double *block)
 {
   bool found = true;
   for (int k = 0; k < BLOCK * BLOCK; ++k) found &= block[k] == 0.0;
   return found;
+}
+
+/// Most columns whose products are subtracted in one pass.
+constexpr int MOST_COLUMNS = 4;
+
+/// The number of blocks below another one in its column.
+inline int below(const BlockView &at, const LeftBlock &left)
+{
+  return at.first[left.column + 1] - left.block - 1;
+}
+
+/// How many blocks of a row, from k on, are of columns that have all further rows in common: with
+/// all fill-in, each is then the parent of the one before in the elimination tree.
+template <int BLOCK> int columns_alike(const BlockView &at, int k, int last)
+{
+  constexpr int SIZE = BLOCK * BLOCK;
+  int n = 1;
+  for (; at.is_complete && n < MOST_COLUMNS && k + n < last; ++n) {
+    const LeftBlock &before = at.left[k + n - 1], &next = at.left[k + n];
+    const bool is_parent = at.row[at.first[before.column]] == next.column;
+    if (!is_parent || below(at, before) != below(at, next)) break;
+    if (is_zero<BLOCK>(at.below + SIZE * next.block)) break;
+  }
+  return n;
+}
+
+template <int BLOCK> Part<BLOCK> part_of(const BlockView &at, const LeftBlock &left)
+{
+  constexpr int SIZE = BLOCK * BLOCK;
+  Part<BLOCK> part;
+  for (int c = 0; c < BLOCK; ++c) {
+    const double pivot = at.diagonal[SIZE * left.column + (BLOCK + 1) * c];
+    for (int r = 0; r < BLOCK; ++r) {
+      part.by[BLOCK * c + r] = at.below[SIZE * left.block + BLOCK * c + r] * pivot;
+    }
+  }
+  return part;
+}
+
+/// Subtracts from column j the contributions of some columns with the same further rows.
+template <int BLOCK, int COLUMNS> void take_columns(const BlockView &at, int j, int k)
+{
+  constexpr int SIZE = BLOCK * BLOCK;
+  const double *own[COLUMNS];
+  Part<BLOCK> part[COLUMNS];
+  for (int m = 0; m < COLUMNS; ++m) {
+    own[m] = at.below + SIZE * at.left[k + m].block;
+    part[m] = part_of<BLOCK>(at, at.left[k + m]);
+  }
+  const auto take = [&](int b, double *from) {
+    Rest<BLOCK> rest;
+    rest.load(from);
+    for (int m = 0; m < COLUMNS; ++m) rest.take(own[m] + SIZE * b, part[m]);
+    rest.put(from);
+  };
+  take(0, at.diagonal + SIZE * j);
+  const int *const row = at.row + at.left[k].block;
+  const int n = below(at, at.left[k]);
+  for (int b = 1; b <= n; ++b) {
+    if (at.column_of_row[row[b]] == j) take(b, at.below + SIZE * at.block_of_row[row[b]]);
+  }
 }
 
 /// Subtracts from a column the contributions of the eliminated ones on its left (left-looking),
@@ -136,22 +222,23 @@ template <int BLOCK> void gather(const BlockView &at, int j)
     at.block_of_row[at.row[b]] = b;
     at.column_of_row[at.row[b]] = j;
   }
-  for (int k = at.first_left[j]; k < at.first_left[j + 1]; ++k) {
-    const int column = at.left[k].column, own = at.left[k].block;
-    if (is_zero<BLOCK>(at.below + SIZE * own)) continue;
-    double part[SIZE];
-    for (int c = 0; c < BLOCK; ++c) {
-      const double pivot = at.diagonal[SIZE * column + (BLOCK + 1) * c];
-      for (int r = 0; r < BLOCK; ++r) {
-        part[BLOCK * c + r] = at.below[SIZE * own + BLOCK * c + r] * pivot;
-      }
+  const int last = at.first_left[j + 1];
+  for (int k = at.first_left[j]; k < last;) {
+    if (is_zero<BLOCK>(at.below + SIZE * at.left[k].block)) {
+      ++k;
+      continue;
     }
-    take_product<BLOCK>(at.below + SIZE * own, part, at.diagonal + SIZE * j);
-    for (int b = own + 1; b < at.first[column + 1]; ++b) {
-      const int r = at.row[b];
-      if (at.column_of_row[r] != j) continue;
-      take_product<BLOCK>(at.below + SIZE * b, part, at.below + SIZE * at.block_of_row[r]);
+    const int n = columns_alike<BLOCK>(at, k, last);
+    if (n == 4) {
+      take_columns<BLOCK, 4>(at, j, k);
+    } else if (n == 3) {
+      take_columns<BLOCK, 3>(at, j, k);
+    } else if (n == 2) {
+      take_columns<BLOCK, 2>(at, j, k);
+    } else {
+      take_columns<BLOCK, 1>(at, j, k);
     }
+    k += n;
   }
 }
 

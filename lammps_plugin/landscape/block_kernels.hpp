@@ -14,6 +14,7 @@ struct LeftBlock {
 /// their places.
 struct BlockView {
   int n;
+  bool is_complete;  // whether the pattern has all fill-in
   const int *first, *row, *first_left;
   const LeftBlock *left;
   double *diagonal, *below, *inverse_pivots;

@@ -18,6 +18,8 @@ class BlockSystem {
  public:
   virtual ~BlockSystem() = default;
   virtual void clear() = 0;
+  /// Whether a pair can be added.
+  virtual bool couples(std::size_t pair) const = 0;
   /// Adds the second derivatives of a pair with respect to the coordinates of its first and its
   /// second particle, a square matrix in columns.
   virtual void add(std::size_t pair, const double *by) = 0;
@@ -123,6 +125,8 @@ template <int BLOCK, int D> class BlockSystemOf : public BlockSystem {
       if (c < 0) value = 1.0;
     });
   }
+
+  bool couples(std::size_t p) const override { return block[p] >= 0; }
 
   void add(std::size_t p, const double *by) override
   {

@@ -53,9 +53,12 @@ inline double residual_of(const LocalEnergyModel &about, const LandscapeSums &su
   return about.largest_part(sums.gradient.data()) / (sums.bond_force / sums.n_bonds);
 }
 
-/// Bracket of the zero of the slope along a line, from 0 where it is negative.
+/// Bracket of the zero of the slope along a line, from 0 where it is negative, to 1.
 class Bracket {
  public:
+  /// Factor by which a bracket grows while it is open.
+  static constexpr double WIDER = 10.0;
+
   explicit Bracket(double slope) : low_slope(slope) {}
 
   /// Takes in a point and proposes the next one.
@@ -72,6 +75,7 @@ class Bracket {
       low = at;
       low_slope = slope;
     }
+    if (!std::isfinite(high)) return std::min(1.0, WIDER * at);
     if (low < corner && corner < high) {  // slightly beyond, so that the contact is closed
       return corner + 1e-3 * (high - corner);
     }
@@ -146,8 +150,8 @@ class Descent {
   static constexpr int MOST_RETURNS = 5;
 
   /// L-BFGS also resumes if a start declared near a minimum is not near one after this many
-  /// evaluations, with complete factors; without them if none of the last ones gained.
-  static constexpr std::int64_t NEAR = 250, NO_CHEAP_GAIN = 35;
+  /// evaluations, with complete factors or without them.
+  static constexpr std::int64_t NEAR = 250, NEAR_BY_ITERATIONS = 40;
 
   /// Largest number of saddles left in one minimisation.
   static constexpr int MOST_SADDLES = 5;
@@ -172,9 +176,6 @@ class Descent {
   static constexpr double COARSE = 0.1;
 
   static constexpr int TRIES = 25;
-  /// A line search begins at this multiple of the fraction of the last step, since closing contacts
-  /// stop successive steps alike, and grows by it while the force has not fallen.
-  static constexpr double WIDER = 10.0;
   static constexpr double TELL_SECONDS = 0.2;
 
   /// Contacts start from the previous ones, as long as this object lives.
@@ -207,7 +208,7 @@ class Descent {
   std::int64_t evaluations = 0;
   double least_energy = INFINITY, least_residual = INFINITY;
   std::size_t most_bonds = 0;  // since the energy or the residual gained
-  double reach = 1.0;          // first fraction of a Newton step that a line search tries
+  double reach = 1.0;  // first fraction of a Newton step to try: closing contacts stop steps alike
   std::int64_t best = 0;       // when the present method gained
   std::int64_t last_gain = 0;  // when any method gained
   bool extended = false;
@@ -245,9 +246,8 @@ class Descent {
   bool is_astray() const
   {
     if (is_near) {
-      const bool is_late =
-          about.has_complete_factors() ? evaluations > NEAR : evaluations > best + NO_CHEAP_GAIN;
-      return residual() >= newton_below && is_late;
+      const auto most = about.has_complete_factors() ? NEAR : NEAR_BY_ITERATIONS;
+      return residual() >= newton_below && evaluations > most;
     }
     if (about.has_complete_factors() && returns == MOST_RETURNS) return false;
     return residual() >= AWAY * newton_below;
@@ -404,11 +404,10 @@ class Descent {
       const double here = refused ? INFINITY : line.sums.gradient.dot(step);
       const bool is_good = std::abs(here) <= 0.9 * std::abs(slope) || (here < 0.0 && factor == 1.0);
       if (is_good || n >= (refused ? 2 * TRIES : TRIES)) {
-        reach = std::min(1.0, WIDER * factor);
+        if (by_newton) reach = std::min(1.0, Bracket::WIDER * factor);
         return line;
       }
-      const double next = bracket.next(factor, here);
-      factor = std::isfinite(next) ? next : std::min(1.0, WIDER * factor);
+      factor = bracket.next(factor, here);
     }
   }
 };

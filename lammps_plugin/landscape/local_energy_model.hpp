@@ -369,29 +369,13 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     const Fill with = most == Fill::COMPLETE ? fill() : most;
     const Moved &posed = moved_to(at);
     std::unique_ptr<BlockSystem> &own = systems[with == Fill::COMPLETE];
-    if (!own || with == Fill::NONE) own = block_system(posed, with);
+    if (!own || with == Fill::NONE) own = block_system(at, with);
     hessian = own.get();
-    hessian->clear();
-    pulled = Eigen::VectorXd::Zero(n());
-    pulled_back = 0.0;
     find_axes(at);
-    std::optional<TurnedBodies<Moved>> turned_bodies;
-    if (any_turns()) turned_bodies.emplace(posed);
-    Team *const by = team_for(posed.size());
-    curved.resize(parts_of(by));
-    in_parts(by, posed.size(), [&](std::size_t k, const Range &part) {
-      each_curved(posed, turned_bodies, part, [&](const Curved &pair) {
-        if (by == nullptr) {
-          add_pair(pair, 1.0 + at.strain);
-        } else {
-          curved[k].push_back(pair);
-        }
-      });
-    });
-    for (auto &part : curved) {
-      for (const Curved &pair : part) add_pair(pair, 1.0 + at.strain);
-      part.clear();
-    }
+    if (add_pairs(posed, at.strain)) return;
+    own = block_system(at, with);
+    hessian = own.get();
+    add_pairs(posed, at.strain);
   }
 
   const Eigen::VectorXd &coupling() const override { return pulled; }
@@ -446,6 +430,10 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
 
   /// Skin of the pairs from which those within the smaller one are chosen, over that.
   static constexpr double WIDER = 5.0;
+
+  /// Gap of the pairs whose blocks are factorised completely, over the skin: wide enough that these
+  /// pairs rarely change while a minimum is approached.
+  static constexpr double CLOSE = 0.1;
 
   /// Fewer pairs are as fast in one thread.
   static constexpr std::size_t MANY = 2000;
@@ -901,13 +889,16 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     }
   }
 
-  /// The block system, with blocks of displacements alone if nothing can rotate. One without
-  /// fill-in is made in no time, so that it leaves out the pairs that do not touch.
-  std::unique_ptr<BlockSystem> block_system(const Moved &posed, Fill with) const
+  /// The block system, with blocks of displacements alone if nothing can rotate. Pairs further
+  /// apart than a small margin are left out, since they would multiply the fill-in; one without
+  /// fill-in is made in no time, so that it leaves out all pairs that do not touch.
+  std::unique_ptr<BlockSystem> block_system(const Displacement &at, Fill with) const
   {
-    std::vector<char> used(posed.size(), 1);
-    for (std::size_t p = 0; p < posed.size() && with == Fill::NONE; ++p) {
-      used[p] = posed.may_touch(p, posed.separation(p));
+    std::vector<char> used(pairs.list().n);
+    const Posed posed = posed_at<double>(pairs, at);
+    for (std::size_t p = 0; p < used.size(); ++p) {
+      used[p] = with == Fill::NONE ? posed.may_touch(p, posed.separation(p))
+                                   : posed.are_closer(p, CLOSE * skin);
     }
     const BlockPlan plan{coordinates.column, pairs.particles, used, shapes.size(), BLOCK, with};
     if (any_turns()) return std::make_unique<BlockSystemOf<BLOCK, D>>(plan);
@@ -1101,6 +1092,41 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     for (int k = 0; k < Pull::RowsAtCompileTime; ++k) {
       if (own[k] >= 0) pulled[own[k]] += pull[k];
     }
+  }
+
+  /// Sets the Hessian and what the strain does to the sums over all pairs. False if its blocks lack
+  /// one.
+  bool add_pairs(const Moved &posed, double strain)
+  {
+    hessian->clear();
+    pulled = Eigen::VectorXd::Zero(n());
+    pulled_back = 0.0;
+    std::optional<TurnedBodies<Moved>> turned_bodies;
+    if (any_turns()) turned_bodies.emplace(posed);
+    bool has_all = true;
+    const auto add = [&](const Curved &pair) {
+      if (hessian->couples(pair.p)) {
+        add_pair(pair, 1.0 + strain);
+      } else {
+        has_all = false;
+      }
+    };
+    Team *const by = team_for(posed.size());
+    curved.resize(parts_of(by));
+    in_parts(by, posed.size(), [&](std::size_t k, const Range &part) {
+      each_curved(posed, turned_bodies, part, [&](const Curved &pair) {
+        if (by == nullptr) {
+          add(pair);
+        } else {
+          curved[k].push_back(pair);
+        }
+      });
+    });
+    for (auto &part : curved) {
+      for (const Curved &pair : part) add(pair);
+      part.clear();
+    }
+    return has_all;
   }
 
   void add_pair(const Curved &pair, double stretch)

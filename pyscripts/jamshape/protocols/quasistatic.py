@@ -25,8 +25,8 @@ _SMALLEST_STEP = 1e-9
 # Most openings of a jammed packing, each by at most a factor of 4 in sqrt(U).
 _MOST_OPENINGS = 30
 
-_PART = 5000  # evaluations after which a long minimisation is reported and stored
-_MOST_PARTS = 40  # of them before it is given up
+_PART = 2000  # evaluations after which a long minimisation is reported and stored
+_MOST_PARTS = 100  # of them before it is given up
 
 # Before a search for an energy the box is compressed further after one part, once in a row, if U/N is below a multiple
 # of the energy tolerance, about what a step adds to a jammed packing: the search opens it again, while the evaluations

@@ -6,6 +6,7 @@ from scenes import pressed
 from squeezed import squeezed
 from superellipsoid_packings import pressed_superellipsoids
 
+import jamshape as js
 from jamshape import _contact
 from jamshape.contacts import find_contacts
 from jamshape.landscape import CrossingError, Landscape, State
@@ -343,3 +344,27 @@ def test_many_particles_in_space_have_solutions_by_iteration():
     found = local_model.factorise(still, 0.0, diagonal).solve(right)
     remainder = hessian @ found + diagonal * found - right
     assert np.linalg.norm(remainder) < 1e-4 * np.linalg.norm(right)
+
+
+@pytest.mark.parametrize("alpha", [0.0, 1.0])
+def test_factors_contain_pairs_that_were_apart_when_the_first_ones_were_made(alpha):
+    """A row of particles with gaps that are closed by moving every other one, without new pairs."""
+    n, gap = 6, 0.06
+    packing = js.Packing.of(
+        "spherocylinder",
+        [[(1.0 + gap) * k, 1.0] for k in range(n)],
+        np.full(n, np.pi / 2),
+        box=[(1.0 + gap) * n, 8.0],
+        alpha=alpha,
+    )
+    landscape = Landscape(packing)
+    x = landscape.coordinates(
+        np.pad(np.where(np.arange(n) % 2, -1.2 * gap, 0.0)[:, None], ((0, 0), (0, 2)))
+    )
+    diagonal, right = np.full(landscape.size, 1e-2), np.arange(1.0, landscape.size + 1)
+    model, fresh = (LocalEnergyModel(landscape, State.of(packing)) for _ in range(2))
+    apart = model.factorise(np.zeros(landscape.size), 0.0, diagonal).solve(right)
+    assert apart == pytest.approx(right / 1e-2)
+    expected = fresh.factorise(x, 0.0, diagonal).solve(right)
+    assert not np.allclose(expected, apart, rtol=0.1)
+    assert model.factorise(x, 0.0, diagonal).solve(right) == pytest.approx(expected, rel=1e-12)
