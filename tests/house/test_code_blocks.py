@@ -39,6 +39,7 @@ NOT_RUN = [
     Told("docs/how-to/cluster.md", "snakemake -s", "needs Snakemake, and Slurm; tests/decks/test_sweep_with_snakemake.py"),
     Told("docs/how-to/cluster.md", "sbatch", "needs Slurm; tests/cluster/slurm_on_one_node.py"),
     Told("docs/how-to/decks.md", "-var jamshape", "needs a clone at a reader's path; tests/decks/test_decks.py"),
+    Told("docs/how-to/install.md", "./run setup", "installs packages; every other ./run begins with it"),
     Told("docs/how-to/install.md", "tests/debian", "makes a Debian as root, or a LAMMPS"),
     Told("docs/how-to/install.md", "pip", "downloads and compiles; ./run wheel does it"),
     Told("docs/development/releases.md", "", "downloads and compiles; ./run wheel does it"),
