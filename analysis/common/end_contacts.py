@@ -1,0 +1,93 @@
+"""Contacts at the ends of rods in space, and the degrees of freedom that contacts block.
+
+All forces at points inside the cylinder are normal to the axis of a rod without friction. Contacts at its ends alone push
+along it, so that a rod at rest has contacts at both ends, or at neither and slides freely along its axis (Heussinger,
+arXiv 2004.13460).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jamshape.arrays import IntArray
+from jamshape.contacts import Contacts
+from jamshape.measures.contact_statistics import held_contacts, lever_arms
+
+
+class EndContacts(NamedTuple):
+    """Contacts of a packing of rods, without rattlers and their contacts."""
+
+    side_to_side: float
+    """Fraction of the bonds at which neither nearest point of the two spines is an end."""
+    end_to_side: float
+    end_to_end: float
+    at_neither: float
+    """Fraction of the rods that have contacts at none of their ends."""
+    at_one: float
+    at_both: float
+    """f_0 of Heussinger."""
+    z: float
+    """Bonds per rod."""
+    z_blocked: float
+    """Bonds per rod that would block all motions but the slides of rods `at_neither`, 8 + 2 f_0 for many."""
+
+    @property
+    def is_isostatic(self) -> int:
+        """1 if there are enough bonds to block these motions."""
+        return int(self.z > self.z_blocked - 1e-9)
+
+
+def touched_ends(found: Contacts) -> IntArray:
+    """Count the ends of each rod that have a contact, (N,) from 0 to 2; contacts of rattlers are left out."""
+    packing, bonds = found.packing, found.network.bonds
+    held = held_contacts(found.network, found.rattlers)[bonds.contact]
+    touched = np.zeros((packing.n, 2), np.bool_)
+    for k, arm in enumerate(lever_arms(packing, found.network)):
+        at_end = held & ~bonds.on_side[:, k]
+        rod = found.pairs[bonds.contact[at_end], k]
+        forward = (arm[at_end] * packing.axes[rod]).sum(axis=1) > 0
+        touched[rod, forward.astype(np.int64)] = True
+    return np.asarray(touched.sum(axis=1))
+
+
+def end_contacts(found: Contacts) -> EndContacts:
+    """Count the contacts at ends, and compare their number with that of the motions to block.
+
+    N rods that do not rattle have 5 N motions less one for each that slides freely, less the translations of all. One
+    more bond blocks the box, since the packing has a pressure.
+
+    Parameters
+    ----------
+    found : Contacts
+        Of rods in three dimensions.
+
+    Raises
+    ------
+    ValueError
+        If a particle is no rod, or no contact is held.
+
+    Examples
+    --------
+    >>> from jamshape import Spherocylinders, make_packing
+    >>> rods = make_packing(Spherocylinders(alpha=4, size_ratio=1), n=16, dimension=3, seed=1, progress=False)
+    >>> end_contacts(rods.contacts()).at_one
+    0.0
+    """
+    packing, network = found.packing, found.network
+    if packing.dimension != 3 or not (packing.half_length > 0).all():
+        msg = (
+            f"the packing in {packing.dimension}D has half lengths from {packing.half_length.min():g},"
+            " expected rods in 3D; select their files"
+        )
+        raise ValueError(msg)
+    held = held_contacts(network, found.rattlers)[network.bonds.contact]
+    of_bonds = np.bincount((~network.bonds.on_side[held]).sum(axis=1), minlength=3)
+    rods = ~found.rattlers
+    n = int(np.count_nonzero(rods))
+    of_rods = np.bincount(touched_ends(found)[rods], minlength=3)
+    motions = packing.freedoms[rods].sum() - of_rods[0] - packing.dimension
+    fractions = [*of_bonds / of_bonds.sum(), *of_rods / n]
+    counts = [2 * of_bonds.sum() / n, 2 * (motions + 1) / n]
+    return EndContacts(*map(float, (*fractions, *counts)))

@@ -1,0 +1,161 @@
+"""Draw density, contacts and end contacts of rods in space against aspect ratio.
+
+    python analysis/heussinger_2020/end_contacts.py SWEEP [MORE ...] --out end_contacts.png
+
+Four panels: phi_J with the maximum of others and the random contact law of long rods; z beside 10 and beside 8 + 2 f_0
+(Heussinger, arXiv 2004.13460), with f_0 the fraction of rods with contacts at both ends; fractions of the contacts
+by ends, and f_0; rattlers. The random contact law takes rods that touch for uncorrelated ones that overlap, so that z is the
+number of rods in the mean excluded volume of one (Onsager 1949). The last line of standard output is one JSON object
+with averages and their standard errors; peak has the largest phi_J and where it is, in JSON with half the
+distance of the next aspect ratios as its error.
+"""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from jamshape.command import parser_of, report, run
+from jamshape.drawing.saving import save_figure
+from jamshape.drawing.styles import BLUE, GREEN, ORANGE, RED
+from jamshape.files.ensembles import PackingFile
+from jamshape.measures.averages import Mean
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import mean_over
+from common.axes import SMALL_TEXT, discs_at, error_bars, figure_of, label_alpha_axis
+from common.end_contacts import EndContacts, end_contacts
+from common.ensembles import Curve, conditions, one_curve, read_groups
+from common.styles import PAPER_LINE, PAPER_STYLE
+from common.text import conditions_text
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+NAMES = ("phi_J", "z", "S2", "n_rattlers")
+MAXIMUM = {0.45: Mean(0.721, 0.001)}
+"""Imaz González & Cinacchi, J. Phys. Chem. B 127, 6814 (2023), abstract: of MRJ packings."""
+PUBLISHED = PAPER_STYLE | {"label": "maximum of MRJ packings (2023)"}
+ISOSTATIC = (0.45, 2.0)
+"""Aspect ratios between which those are isostatic, abstract."""
+CONTACTS = {
+    "side_to_side": ("s-", BLUE, "contacts, side to side"),
+    "end_to_side": ("o-", RED, "contacts, end to side"),
+    "end_to_end": ("D-", GREEN, "contacts, end to end"),
+    "at_both": ("^-", ORANGE, "rods with contacts at both ends, $f_0$"),
+}
+
+Averages = dict[str, dict[float, Mean]]
+
+
+def excluded_volume(alpha: float) -> float:
+    """Return the mean volume that a rod excludes to the centre of another one, over the volume of a rod.
+
+    Of spherocylinders in random directions, alpha = L/D.
+
+    Examples
+    --------
+    >>> excluded_volume(0.0)
+    8.0
+    """
+    return 8 * (1 + 1.5 * alpha + 0.375 * alpha**2) / (1 + 1.5 * alpha)
+
+
+def ends_of(files: Sequence[PackingFile]) -> dict[str, Mean]:
+    """Average over samples; z_missing is 8 + 2 f_0 - z without its part of 1 / N."""
+    found = [end_contacts(file.contacts()) for file in files]
+    columns = {name: [float(getattr(of, name)) for of in found] for name in EndContacts._fields}
+    columns["z_missing"] = [of.z_blocked - of.z for of in found]
+    columns["is_isostatic"] = [of.is_isostatic for of in found]
+    return {name: mean_over(files, values) for name, values in columns.items()}
+
+
+def averages(curve: Curve) -> Averages:
+    """Average over the samples of each aspect ratio, end contacts over those of rods alone."""
+    found: Averages = {
+        name: {a: mean_over(of, [file.number(name) for file in of]) for a, of in curve.items()}
+        for name in NAMES
+    }
+    for alpha, files in curve.items():
+        for name, mean in (ends_of(files) if alpha > 0 else {}).items():
+            if name not in NAMES:
+                found.setdefault(name, {})[alpha] = mean
+    return found
+
+
+def peak_of(phi_J: dict[float, Mean]) -> dict[str, Any]:
+    """Find the aspect ratio of the largest phi_J."""
+    alphas = sorted(phi_J)
+    best = max(alphas, key=lambda alpha: phi_J[alpha].value)
+    k = alphas.index(best)
+    beside = alphas[max(k - 1, 0) : k + 2]
+    return {"phi_J": phi_J[best], "alpha": best, "alpha_error": (beside[-1] - beside[0]) / 4}
+
+
+def figure_from(found: Averages, title: str) -> Figure:
+    """Draw the four panels."""
+    figure = figure_of(10, 8, dpi=90)
+    panels = figure.subplots(2, 2)
+    spheres = discs_at(found["phi_J"])
+    ours: dict[str, Any] = {"fmt": "o-", "color": BLUE, "label": "ours", "ms": 4}
+    draw_density(panels[0, 0], found, spheres, ours)
+    draw_contacts(panels[0, 1], found, spheres, ours)
+    for name, (fmt, tint, text) in CONTACTS.items():
+        error_bars(panels[1, 0], found[name], None, fmt=fmt, color=tint, mfc="none", label=text)
+    panels[1, 0].set(ylabel="fraction", ylim=(-0.03, 1.03))
+    error_bars(panels[1, 1], found["n_rattlers"], spheres, **ours)
+    panels[1, 1].set_ylabel("rattlers per packing")
+    for axes in panels.flat:
+        label_alpha_axis(axes, None if axes is panels[1, 0] else spheres)
+        axes.legend(**SMALL_TEXT)
+    figure.suptitle(title, fontsize=8)
+    return figure
+
+
+def draw_density(axes: Axes, found: Averages, spheres: float, ours: dict[str, Any]) -> None:
+    """Draw phi_J and the random contact law, for rods longer than thick."""
+    error_bars(axes, found["phi_J"], spheres, **ours)
+    error_bars(axes, MAXIMUM, None, **PUBLISHED)
+    law = [(a, z.value / excluded_volume(a)) for a, z in sorted(found["z"].items()) if a >= 1]
+    axes.plot(*np.reshape(law, (-1, 2)).T, label="random contacts, our $z$", **PAPER_LINE)
+    axes.set_ylabel(r"packing fraction $\phi_J$")
+
+
+def draw_contacts(axes: Axes, found: Averages, spheres: float, ours: dict[str, Any]) -> None:
+    """Draw z, the isostatic number of rods, and the same without rods that slide."""
+    error_bars(axes, found["z"], spheres, **ours)
+    error_bars(axes, found["z_blocked"], None, fmt="^-", color=ORANGE, mfc="none", ms=4,
+               label=r"$8+2f_0$, less $4/N$")  # fmt: skip
+    axes.axhline(10, label="isostatic rods", **PAPER_LINE)
+    axes.set_ylabel("contacts per rod $z_J$")
+
+
+def main(options: Namespace) -> None:
+    """Read, average, draw, report."""
+    groups = read_groups(options.files, needs=("alpha", *NAMES), same=("n", "size_ratio", "u0"))
+    system, curve = one_curve(groups, "alpha")
+    found = averages(curve)
+    save_figure(figure_from(found, conditions_text(groups)), options.out)
+    between = [a for a in curve if ISOSTATIC[0] <= a <= ISOSTATIC[1]]
+    packings = {a: len(curve[a]) for a in between}
+    isostatic = sum(round(found["is_isostatic"][a].value * packings[a]) for a in between)
+    rods = [
+        system.report() | {"alpha": a} | {name: of[a] for name, of in found.items() if a in of}
+        for a in curve
+    ]
+    told = {
+        "isostatic": isostatic,
+        "packings": sum(packings.values()),
+        "peak": peak_of(found["phi_J"]),
+    }
+    report({"out": options.out, "conditions": conditions(groups)} | told | {"rods": rods})
+
+
+if __name__ == "__main__":
+    run(parser_of(__doc__, "end_contacts.png", "SWEEP"), main)
