@@ -11,13 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jamshape.arrays import IntArray
-from jamshape.contacts import Contacts
+from jamshape.arrays import BoolArray, IntArray
+from jamshape.contacts import Contacts, is_grazing
 from jamshape.measures.contact_statistics import held_contacts, lever_arms
 
 
 class EndContacts(NamedTuple):
-    """Contacts of a packing of rods, without rattlers and their contacts."""
+    """Contacts of a packing of rods, without rattlers and their contacts, and without grazing bonds."""
 
     side_to_side: float
     """Fraction of the bonds at which neither nearest point of the two spines is an end."""
@@ -39,13 +39,19 @@ class EndContacts(NamedTuple):
         return int(self.z > self.z_blocked - 1e-9)
 
 
+def bearing_bonds(found: Contacts) -> BoolArray:
+    """Flag the bonds that count, (B,): without those of rattlers and without grazing ones."""
+    held = held_contacts(found.network, found.rattlers)
+    return held[found.network.bonds.contact] & ~is_grazing(found.network, held)
+
+
 def touched_ends(found: Contacts) -> IntArray:
-    """Count the ends of each rod that have a contact, (N,) from 0 to 2; contacts of rattlers are left out."""
+    """Count the ends of each rod that have a bond of `bearing_bonds`, (N,) from 0 to 2."""
     packing, bonds = found.packing, found.network.bonds
-    held = held_contacts(found.network, found.rattlers)[bonds.contact]
+    bearing = bearing_bonds(found)
     touched = np.zeros((packing.n, 2), np.bool_)
     for k, arm in enumerate(lever_arms(packing, found.network)):
-        at_end = held & ~bonds.on_side[:, k]
+        at_end = bearing & ~bonds.on_side[:, k]
         rod = found.pairs[bonds.contact[at_end], k]
         forward = (arm[at_end] * packing.axes[rod]).sum(axis=1) > 0
         touched[rod, forward.astype(np.int64)] = True
@@ -75,15 +81,15 @@ def end_contacts(found: Contacts) -> EndContacts:
     >>> end_contacts(rods.contacts()).at_one
     0.0
     """
-    packing, network = found.packing, found.network
+    packing = found.packing
     if packing.dimension != 3 or not (packing.half_length > 0).all():
         msg = (
             f"the packing in {packing.dimension}D has half lengths from {packing.half_length.min():g},"
             " expected rods in 3D; select their files"
         )
         raise ValueError(msg)
-    held = held_contacts(network, found.rattlers)[network.bonds.contact]
-    of_bonds = np.bincount((~network.bonds.on_side[held]).sum(axis=1), minlength=3)
+    on_side = found.network.bonds.on_side[bearing_bonds(found)]
+    of_bonds = np.bincount((~on_side).sum(axis=1), minlength=3)
     rods = ~found.rattlers
     n = int(np.count_nonzero(rods))
     of_rods = np.bincount(touched_ends(found)[rods], minlength=3)

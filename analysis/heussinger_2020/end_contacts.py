@@ -4,10 +4,10 @@
 
 Four panels: phi_J with the maximum of others and the random contact law of long rods; z beside 10 and beside 8 + 2 f_0
 (Heussinger, arXiv 2004.13460), with f_0 the fraction of rods with contacts at both ends; fractions of the contacts
-by ends, and f_0; rattlers. The random contact law takes rods that touch for uncorrelated ones that overlap, so that z is the
-number of rods in the mean excluded volume of one (Onsager 1949). The last line of standard output is one JSON object
-with averages and their standard errors; peak has the largest phi_J and where it is, in JSON with half the
-distance of the next aspect ratios as its error.
+by ends, and f_0; rattlers. Grazing bonds, below 1e-6 of the mean force, do not count. The random contact law takes rods that touch
+for uncorrelated ones that overlap, so that z is the number of rods in the mean excluded volume of one (Onsager 1949). The
+last line of standard output is one JSON object with averages and their standard errors; peak has the largest
+phi_J and its alpha, with half the mean distance of the next ones as its error.
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-NAMES = ("phi_J", "z", "S2", "n_rattlers")
+NAMES = {"phi_J": "phi_J", "z": "z_bearing", "S2": "S2", "n_rattlers": "n_rattlers"}
+"""Attributes of files by the names of what is drawn; z is without grazing bonds."""
 MAXIMUM = {0.45: Mean(0.721, 0.001)}
 """Imaz González & Cinacchi, J. Phys. Chem. B 127, 6814 (2023), abstract: of MRJ packings."""
 PUBLISHED = PAPER_STYLE | {"label": "maximum of MRJ packings (2023)"}
@@ -79,8 +80,8 @@ def ends_of(files: Sequence[PackingFile]) -> dict[str, Mean]:
 def averages(curve: Curve) -> Averages:
     """Average over the samples of each aspect ratio, end contacts over those of rods alone."""
     found: Averages = {
-        name: {a: mean_over(of, [file.number(name) for file in of]) for a, of in curve.items()}
-        for name in NAMES
+        name: {a: mean_over(of, [file.number(own) for file in of]) for a, of in curve.items()}
+        for name, own in NAMES.items()
     }
     for alpha, files in curve.items():
         for name, mean in (ends_of(files) if alpha > 0 else {}).items():
@@ -138,7 +139,9 @@ def draw_contacts(axes: Axes, found: Averages, spheres: float, ours: dict[str, A
 
 def main(options: Namespace) -> None:
     """Read, average, draw, report."""
-    groups = read_groups(options.files, needs=("alpha", *NAMES), same=("n", "size_ratio", "u0"))
+    groups = read_groups(
+        options.files, needs=("alpha", *NAMES.values()), same=("n", "size_ratio", "u0")
+    )
     system, curve = one_curve(groups, "alpha")
     found = averages(curve)
     save_figure(figure_from(found, conditions_text(groups)), options.out)

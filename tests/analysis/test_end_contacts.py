@@ -60,6 +60,15 @@ def test_contacts_of_rattlers_do_not_count():
     assert end_contacts(without)[:3] == pytest.approx((1 / 3, 1 / 3, 1 / 3))
 
 
+def test_grazing_bonds_do_not_count():
+    row = np.array(ROW[0])
+    row[2, 0] += 0.01 - 1e-9
+    found = of(SIDES, ON_SIDE, (row, ROW[1]))
+    assert len(found) == 4
+    assert touched_ends(found).tolist() == [0, 0, 0, 1, 1, 1, 0]
+    assert end_contacts(found).z == pytest.approx(2 * 3 / 7)
+
+
 def test_rods_at_rest_have_contacts_at_both_ends_or_at_neither(at_rest):
     """Without friction, only contacts at ends push a rod along its axis."""
     found = at_rest.contacts()
