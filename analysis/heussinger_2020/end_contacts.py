@@ -5,9 +5,9 @@
 Four panels: phi_J with the maximum of others and the random contact law of long rods; z beside 10 and beside 8 + 2 f_0
 (Heussinger, arXiv 2004.13460), with f_0 the fraction of rods with contacts at both ends; fractions of the contacts
 by ends, and f_0; rattlers. Grazing bonds, below 1e-6 of the mean force, do not count. The random contact law takes rods that touch
-for uncorrelated ones that overlap, so that z is the number of rods in the mean excluded volume of one (Onsager 1949). The
-last line of standard output is one JSON object with averages and their standard errors; peak has the largest
-phi_J and its alpha, with half the mean distance of the next ones as its error.
+for uncorrelated ones that overlap: z is then the number of rods in the volume that a thin rod excludes, 2 alpha phi (Onsager
+1949; Wouterse, Luding & Philipse 2009). The last line of standard output is one JSON object with averages and their
+standard errors; peak has the largest phi_J and its alpha, with half the mean distance of the next ones as its error.
 """
 
 from __future__ import annotations
@@ -38,11 +38,13 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-NAMES = {"phi_J": "phi_J", "z": "z_bearing", "S2": "S2", "n_rattlers": "n_rattlers"}
+NAMES = {"phi_J": "phi_J", "z": "z_bearing", "S2": "S2"}
 """Attributes of files by the names of what is drawn; z is without grazing bonds."""
 MAXIMUM = {0.45: Mean(0.721, 0.001)}
 """Imaz González & Cinacchi, J. Phys. Chem. B 127, 6814 (2023), abstract: of MRJ packings."""
 PUBLISHED = PAPER_STYLE | {"label": "maximum of MRJ packings (2023)"}
+THIN = 7.0
+"""Smallest aspect ratio at which the random contact law is drawn."""
 ISOSTATIC = (0.45, 2.0)
 """Aspect ratios between which those are isostatic, abstract."""
 CONTACTS = {
@@ -53,19 +55,6 @@ CONTACTS = {
 }
 
 Averages = dict[str, dict[float, Mean]]
-
-
-def excluded_volume(alpha: float) -> float:
-    """Return the mean volume that a rod excludes to the centre of another one, over the volume of a rod.
-
-    Of spherocylinders in random directions, alpha = L/D.
-
-    Examples
-    --------
-    >>> excluded_volume(0.0)
-    8.0
-    """
-    return 8 * (1 + 1.5 * alpha + 0.375 * alpha**2) / (1 + 1.5 * alpha)
 
 
 def ends_of(files: Sequence[PackingFile]) -> dict[str, Mean]:
@@ -82,6 +71,10 @@ def averages(curve: Curve) -> Averages:
     found: Averages = {
         name: {a: mean_over(of, [file.number(own) for file in of]) for a, of in curve.items()}
         for name, own in NAMES.items()
+    }
+    found["rattlers"] = {
+        alpha: mean_over(of, [file.number("n_rattlers") / file.number("n") for file in of])
+        for alpha, of in curve.items()
     }
     for alpha, files in curve.items():
         for name, mean in (ends_of(files) if alpha > 0 else {}).items():
@@ -110,21 +103,23 @@ def figure_from(found: Averages, title: str) -> Figure:
     for name, (fmt, tint, text) in CONTACTS.items():
         error_bars(panels[1, 0], found[name], None, fmt=fmt, color=tint, mfc="none", label=text)
     panels[1, 0].set(ylabel="fraction", ylim=(-0.03, 1.03))
-    error_bars(panels[1, 1], found["n_rattlers"], spheres, **ours)
-    panels[1, 1].set_ylabel("rattlers per packing")
+    error_bars(panels[1, 1], found["rattlers"], spheres, **ours)
+    panels[1, 1].set_ylabel("fraction of rattlers")
     for axes in panels.flat:
         label_alpha_axis(axes, None if axes is panels[1, 0] else spheres)
         axes.legend(**SMALL_TEXT)
+    panels[1, 0].legend(loc="upper left", bbox_to_anchor=(0, 0.95), **SMALL_TEXT)
     figure.suptitle(title, fontsize=8)
     return figure
 
 
 def draw_density(axes: Axes, found: Averages, spheres: float, ours: dict[str, Any]) -> None:
-    """Draw phi_J and the random contact law, for rods longer than thick."""
+    """Draw phi_J and the random contact law of thin rods."""
     error_bars(axes, found["phi_J"], spheres, **ours)
     error_bars(axes, MAXIMUM, None, **PUBLISHED)
-    law = [(a, z.value / excluded_volume(a)) for a, z in sorted(found["z"].items()) if a >= 1]
-    axes.plot(*np.reshape(law, (-1, 2)).T, label="random contacts, our $z$", **PAPER_LINE)
+    law = [(a, z.value / (2 * a)) for a, z in sorted(found["z"].items()) if a >= THIN]
+    label = r"random contacts of thin rods, $z_J/2\alpha$"
+    axes.plot(*np.reshape(law, (-1, 2)).T, label=label, **PAPER_LINE)
     axes.set_ylabel(r"packing fraction $\phi_J$")
 
 
@@ -140,7 +135,9 @@ def draw_contacts(axes: Axes, found: Averages, spheres: float, ours: dict[str, A
 def main(options: Namespace) -> None:
     """Read, average, draw, report."""
     groups = read_groups(
-        options.files, needs=("alpha", *NAMES.values()), same=("n", "size_ratio", "u0")
+        options.files,
+        needs=("alpha", "n_rattlers", *NAMES.values()),
+        same=("n", "size_ratio", "u0"),
     )
     system, curve = one_curve(groups, "alpha")
     found = averages(curve)

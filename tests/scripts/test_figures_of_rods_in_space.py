@@ -5,12 +5,9 @@ import runpy
 from pathlib import Path
 
 import pytest
-from mixtures import monodisperse
 from pictures import image
 
 import jamshape as js
-from jamshape.contacts import find_contacts
-from jamshape.protocols.random_start import dilute_packing
 
 ANALYSIS = Path(__file__).parents[2] / "analysis"
 SCRIPT = "heussinger_2020/end_contacts.py"
@@ -66,14 +63,6 @@ def test_the_peak_is_between_its_neighbours(script):
     found = script["peak_of"](phi_J)
     assert (found["alpha"], found["phi_J"].value) == (0.5, 0.7)
     assert found["alpha_error"] == pytest.approx(0.1)
-
-
-@pytest.mark.parametrize("alpha", [0.0, 1.0, 6.0])
-def test_excluded_volume_is_that_of_rods_in_random_directions(script, alpha):
-    """Rods at random places and directions overlap as often as it says."""
-    of = dilute_packing(1500, 0.02, 1, monodisperse(alpha))
-    expected = of.n**2 / 2 * script["excluded_volume"](alpha) * of.measures[0] / of.box.volume
-    assert len(find_contacts(of).pairs) == pytest.approx(expected, abs=5 * expected**0.5)
 
 
 def test_the_published_maximum_is_that_of_the_table(script):
