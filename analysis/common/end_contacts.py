@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jamshape.arrays import BoolArray, IntArray
-from jamshape.contacts import Contacts, is_grazing
+from jamshape.contacts import ContactKind, ContactNetwork, Contacts, is_grazing
 from jamshape.measures.contact_statistics import held_contacts, lever_arms
 
 
@@ -45,15 +45,24 @@ def bearing_bonds(found: Contacts) -> BoolArray:
     return held[found.network.bonds.contact] & ~is_grazing(found.network, held)
 
 
+def at_ends(network: ContactNetwork) -> BoolArray:
+    """Flag whether each bond is at an end of either rod, (B, 2).
+
+    Parallel rods side by side touch at two points where one or the other ends, but with forces normal to both.
+    """
+    is_beside = network.kind[network.bonds.contact] == ContactKind.SIDE_TO_SIDE
+    return np.asarray(~network.bonds.on_side & ~is_beside[:, None])
+
+
 def touched_ends(found: Contacts) -> IntArray:
     """Count the ends of each rod that have a bond of `bearing_bonds`, (N,) from 0 to 2."""
     packing, bonds = found.packing, found.network.bonds
-    bearing = bearing_bonds(found)
+    counted = at_ends(found.network) & bearing_bonds(found)[:, None]
     touched = np.zeros((packing.n, 2), np.bool_)
     for k, arm in enumerate(lever_arms(packing, found.network)):
-        at_end = bearing & ~bonds.on_side[:, k]
-        rod = found.pairs[bonds.contact[at_end], k]
-        forward = (arm[at_end] * packing.axes[rod]).sum(axis=1) > 0
+        own = counted[:, k]
+        rod = found.pairs[bonds.contact[own], k]
+        forward = (arm[own] * packing.axes[rod]).sum(axis=1) > 0
         touched[rod, forward.astype(np.int64)] = True
     return np.asarray(touched.sum(axis=1))
 
@@ -88,8 +97,8 @@ def end_contacts(found: Contacts) -> EndContacts:
             " expected rods in 3D; select their files"
         )
         raise ValueError(msg)
-    on_side = found.network.bonds.on_side[bearing_bonds(found)]
-    of_bonds = np.bincount((~on_side).sum(axis=1), minlength=3)
+    bonds_at_ends = at_ends(found.network)[bearing_bonds(found)]
+    of_bonds = np.bincount(bonds_at_ends.sum(axis=1), minlength=3)
     rods = ~found.rattlers
     n = int(np.count_nonzero(rods))
     of_rods = np.bincount(touched_ends(found)[rods], minlength=3)

@@ -7,7 +7,8 @@ Four panels: phi_J with the maximum of others and the random contact law of long
 by ends, and f_0; rattlers. Grazing bonds, below 1e-6 of the mean force, do not count. The random contact law takes rods that touch
 for uncorrelated ones that overlap: z is then the number of rods in the volume that a thin rod excludes, 2 alpha phi (Onsager
 1949; Wouterse, Luding & Philipse 2009). The last line of standard output is one JSON object with averages and their
-standard errors; peak has the largest phi_J and its alpha, with half the mean distance of the next ones as its error.
+standard errors; peak has the largest phi_J and its alpha, with half the mean distance of the next ones as its error; as_many
+counts the packings of --modes with as many zero modes as rods that have contacts at neither end, which slide freely.
 """
 
 from __future__ import annotations
@@ -25,11 +26,12 @@ from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import BLUE, GREEN, ORANGE, RED
 from jamshape.files.ensembles import PackingFile
 from jamshape.measures.averages import Mean
+from jamshape.vibration.table import ModeTable, read_modes
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.averages import mean_over
 from common.axes import SMALL_TEXT, discs_at, error_bars, figure_of, label_alpha_axis
-from common.end_contacts import EndContacts, end_contacts
+from common.end_contacts import EndContacts, end_contacts, touched_ends
 from common.ensembles import Curve, conditions, one_curve, read_groups
 from common.styles import PAPER_LINE, PAPER_STYLE
 from common.text import conditions_text
@@ -81,6 +83,24 @@ def averages(curve: Curve) -> Averages:
             if name not in NAMES:
                 found.setdefault(name, {})[alpha] = mean
     return found
+
+
+def zero_modes(table: ModeTable) -> int:
+    """Count the modes but translations whose eigenvalue is 0 within its bound."""
+    return int(np.count_nonzero((table["sign"] == 0) & ~table["is_translation"]))
+
+
+def slides_of(curve: Curve, modes: Path | None) -> dict[str, int]:
+    """Count packings with modes in a folder, and those with as many zero modes as rods at neither end."""
+    counts = {"with_modes": 0, "as_many": 0}
+    for file in [one for alpha, files in curve.items() if alpha > 0 for one in files]:
+        path = modes / f"{file.path.stem}.modes.h5" if modes else None
+        if path and path.exists():
+            found = file.contacts()
+            free = np.count_nonzero(touched_ends(found)[~found.rattlers] == 0)
+            counts["with_modes"] += 1
+            counts["as_many"] += int(zero_modes(read_modes(path)) == free)
+    return counts
 
 
 def peak_of(phi_J: dict[float, Mean]) -> dict[str, Any]:
@@ -154,8 +174,11 @@ def main(options: Namespace) -> None:
         "packings": sum(packings.values()),
         "peak": peak_of(found["phi_J"]),
     }
+    told |= slides_of(curve, options.modes)
     report({"out": options.out, "conditions": conditions(groups)} | told | {"rods": rods})
 
 
 if __name__ == "__main__":
-    run(parser_of(__doc__, "end_contacts.png", "SWEEP"), main)
+    parser = parser_of(__doc__, "end_contacts.png", "SWEEP")
+    parser.add_argument("--modes", type=Path, help="folder of modes of the same packings")
+    run(parser, main)

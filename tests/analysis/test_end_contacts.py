@@ -60,6 +60,13 @@ def test_contacts_of_rattlers_do_not_count():
     assert end_contacts(without)[:3] == pytest.approx((1 / 3, 1 / 3, 1 / 3))
 
 
+def test_parallel_rods_side_by_side_do_not_touch_at_ends():
+    found = of(([[10, 10, 10], [10.7, 10 + APART, 10]], [X, X]))
+    assert found.network.n_bonds.tolist() == [2]
+    assert touched_ends(found).tolist() == [0, 0]
+    assert end_contacts(found).side_to_side == 1
+
+
 def test_grazing_bonds_do_not_count():
     row = np.array(ROW[0])
     row[2, 0] += 0.01 - 1e-9
