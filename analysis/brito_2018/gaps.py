@@ -3,8 +3,8 @@
     python analysis/brito_2018/gaps.py SWEEP [MORE ...] --out gaps.png
 
 The gap h of two particles is the swelling at which they touch: of all particles about their centres, by the factor 1 + h. It is
-r / (R_i + R_j) - 1 of discs. Gaps are found as contacts that appear when the particles of a packing swell in small steps, which
-are 5 % of h. The density of small gaps is taken as h^-gamma, with gamma from those below --below as in forces.py; JSON has it for
+r / (R_i + R_j) - 1 of discs. Gaps are found as contacts that appear when the particles of a packing swell in small steps, of
+10 % of h. The density of small gaps is taken as h^-gamma, with gamma from those below --below as in forces.py; JSON has it for
 several bounds. Brito, Ikeda, Urbani, Wyart & Zamponi, PNAS 115, 11736 (2018), state that gaps of hypostatic packings follow no
 power law, unlike those of isostatic packings of round particles. Rattlers are left out. The last line of standard output is
 one JSON object.
@@ -33,8 +33,8 @@ GAPS = Quantity(
     sign=-1,
     bounds=(0.1, 0.05, 0.02, 0.01),
 )
-SWELLINGS = np.geomspace(1e-6, 0.2, 251)
-"""Above overlaps of packings at u0 = 1e-15, and far below the smallest bound."""
+SWELLINGS = np.geomspace(1e-7, 0.2, 146)
+"""From overlaps of packings at u0 = 1e-15, far below the smallest bound."""
 
 
 def gaps_of(file: PackingFile) -> FloatArray:
