@@ -6,7 +6,8 @@ The density of small forces f, over their mean, is taken as f^theta. theta is th
 --below, with its error: 1 + theta = 1 / <ln(below / f)>. Of a smooth distribution with a finite P(0) it goes to 0 with the bound,
 in proportion to it; JSON has it for several bounds. Brito, Ikeda, Urbani, Wyart & Zamponi, PNAS 115, 11736 (2018), state
 that forces of hypostatic packings follow no power law, so that P(0) is finite and theta 0, unlike those of isostatic
-packings of round particles. Bonds of rattlers are left out. The last line of standard output is one JSON object.
+packings of round particles. Bonds of rattlers and grazing bonds, below 1e-6 of the mean,
+are left out. The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from jamshape.contacts import Contacts
 from jamshape.files.ensembles import PackingFile
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.bearing import bearing_bonds
 from common.small_values import Quantity, add_options, study
 
 FORCES = Quantity(
@@ -37,9 +39,7 @@ FORCES = Quantity(
 def forces_of(file: PackingFile) -> FloatArray:
     """Return the (B,) magnitudes of the bond forces of a packing over their mean."""
     found = Contacts.of(file.packing())
-    bonds = found.network.bonds
-    held = ~found.rattlers[found.pairs[bonds.contact]].any(axis=1)
-    size = np.linalg.norm(bonds.force[held], axis=1)
+    size = np.linalg.norm(found.network.bonds.force[bearing_bonds(found)], axis=1)
     return np.asarray(size / size.mean())
 
 

@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from common.bearing import bearing_bonds
 from jamshape.arrays import BoolArray, IntArray
-from jamshape.contacts import ContactKind, ContactNetwork, Contacts, is_grazing
-from jamshape.measures.contact_statistics import held_contacts, lever_arms
+from jamshape.contacts import ContactKind, ContactNetwork, Contacts
+from jamshape.measures.contact_statistics import lever_arms
 
 
 class EndContacts(NamedTuple):
@@ -37,12 +38,6 @@ class EndContacts(NamedTuple):
     def is_isostatic(self) -> int:
         """1 if there are enough bonds to block these motions."""
         return int(self.z > self.z_blocked - 1e-9)
-
-
-def bearing_bonds(found: Contacts) -> BoolArray:
-    """Flag the bonds that count, (B,): without those of rattlers and without grazing ones."""
-    held = held_contacts(found.network, found.rattlers)
-    return held[found.network.bonds.contact] & ~is_grazing(found.network, held)
 
 
 def at_ends(network: ContactNetwork) -> BoolArray:
