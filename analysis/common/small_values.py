@@ -28,11 +28,11 @@ class Quantity(NamedTuple):
     """A quantity whose small values x have the density x^(sign power)."""
 
     name: str
-    """Of several values, such as forces."""
+    """Plural, such as forces."""
     label: str
-    """Of an axis, in TeX."""
+    """Label of an axis, in TeX."""
     symbol: str
-    """Of the power, in TeX."""
+    """Symbol of the power, in TeX."""
     power: str
     """Name of the power in JSON."""
     sign: int
