@@ -497,6 +497,7 @@ TITLES = {
     "marschall_shear": "Marschall, Keta, Olsson & Teitel, Phys. Rev. Lett. 122, 188002 (2019), and Phys. Rev. E 100, 032906 (2019) and 101, 032901 (2020)",
     "brito_2018": "Brito, Ikeda, Urbani, Wyart & Zamponi, PNAS 115, 11736 (2018)",
     "rocks_hoy_2023": "Rocks & Hoy, Soft Matter (2023)",
+    "heussinger_2020": "Heussinger, arXiv 2004.13460 (2020), and others on spherocylinders in 3D",
     "yuan_2019": "Yuan, VanderWerf, Shattuck & O'Hern, Soft Matter (2019)",
 }
 

@@ -19,6 +19,7 @@ from jamshape.command import plain
 from jamshape.files.disk import store
 from jamshape.landscape import Landscape, State
 from jamshape.minima.target import TargetError
+from jamshape.packing import Packing
 from jamshape.recording.workers import Workers
 from jamshape.shapes.particles import Particles
 from jamshape.vibration.elasticity import Moduli, moduli
@@ -179,7 +180,7 @@ def measured(packing: js.Packing) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def elasticity_of(packing: js.Packing) -> tuple[DynamicalMatrix, Moduli]:
+def elasticity_of(packing: Packing) -> tuple[DynamicalMatrix, Moduli]:
     """Find the dynamical matrix of a packing and its moduli."""
     landscape, state = Landscape(packing), State.of(packing)
     matrix = dynamical_matrix(landscape, state)

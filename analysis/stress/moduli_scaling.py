@@ -24,13 +24,12 @@ from jamshape.drawing.saving import save_figure
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.axes import figure_of
+from common.moduli_fit import Average, average_of
 from common.stressed import (
     Series,
     Table,
     add_options,
-    draws,
     found_of,
-    mean_and_error,
     mean_of,
     pressures_of,
     table_of,
@@ -42,46 +41,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_BETAS = np.linspace(0.1, 2.0, 381)
 AVERAGES = ("all", "positive", "directions")
 """G of all packings, of those of positive G, and of all packings over all directions of shear."""
 DRAWN = AVERAGES[:2]
-
-
-class Fit(NamedTuple):
-    """G = G_0 + c p^beta."""
-
-    G_0: float
-    c: float
-    beta: float
-    chi2: float
-
-
-def fitted(p: FloatArray, G: FloatArray, error: FloatArray) -> Fit:
-    """Fit by weighted least squares: a line in p^beta for each beta; NaN from fewer than three points."""
-    if len(p) < 3:
-        return Fit(*[np.nan] * 4)
-    weight = error**-2 / (error**-2).sum()
-    x = p ** _BETAS[:, None]
-    x_mean, G_mean = x @ weight, G @ weight
-    off = x - x_mean[:, None]
-    c = (off * (G - G_mean)) @ weight / (off**2 @ weight)
-    G_0 = G_mean - c * x_mean
-    chi2 = (((G - G_0[:, None] - c[:, None] * x) / error) ** 2).sum(axis=1)
-    best = int(np.argmin(chi2))
-    return Fit(float(G_0[best]), float(c[best]), float(_BETAS[best]), float(chi2[best]))
-
-
-class Average(NamedTuple):
-    """Average over packings with its fit."""
-
-    G: FloatArray
-    """(k,) by pressure."""
-    error: FloatArray
-    """(k,)"""
-    fit: Fit
-    errors: Fit
-    """Standard deviations over the bootstrap."""
 
 
 class Scaling(NamedTuple):
@@ -114,14 +76,6 @@ def scaling_of(alpha: float, n: int, table: Table, last: float) -> Scaling:
     positive = mean_of(np.where(np.isfinite(G), G > 0, np.nan))
     undefined = np.isnan(G).mean(axis=0)
     return Scaling(alpha, n, len(G), p, averages, positive, undefined, last)
-
-
-def average_of(p: FloatArray, G: FloatArray, last: float) -> Average:
-    """Average (m, k) moduli and fit, up to a pressure; a fifth of the draws is fitted."""
-    mean, error = mean_and_error(G)
-    of = (p <= last * (1 + 1e-9)) & (error > 0)
-    drawn = [fitted(p[of], mean_of(G[k][:, of]), error[of]) for k in list(draws(len(G)))[::5]]
-    return Average(mean, error, fitted(p[of], mean[of], error[of]), Fit(*np.std(drawn, axis=0)))
 
 
 def figure_from(found: list[Scaling]) -> Figure:

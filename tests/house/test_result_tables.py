@@ -12,6 +12,7 @@ RESULTS = ROOT / "docs" / "results"
 PAPERS = {
     "marschall-2018": 10, "yuan-2019": 10, "vanderwerf-2018": 1,
     "zhang-2021": 7, "marschall-shear": 5, "brito-2018": 6, "rocks-hoy-2023": 1,
+    "heussinger-2020": 5,
 }  # fmt: skip
 """With more measured numbers than that."""
 

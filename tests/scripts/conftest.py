@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 ANALYSIS = Path(__file__).parents[2] / "analysis"
 PAPERS = (
     "marschall_2018", "yuan_2019", "vanderwerf_2018", "zhang_2021", "marschall_shear", "brito_2018",
-    "rocks_hoy_2023",
+    "rocks_hoy_2023", "heussinger_2020",
 )  # fmt: skip
 
 

@@ -8,6 +8,8 @@ import pytest
 from pictures import image
 
 import jamshape as js
+from common.small_values import exponent_of
+from jamshape.files.ensembles import PackingFile
 
 FOLDER = "brito_2018"
 ANALYSIS = Path(__file__).parents[2] / "analysis"
@@ -48,19 +50,48 @@ def test_contacts_need_round_particles(problem, sweep, tmp_path):
     )
 
 
-def test_forces_of_each_shape(report, sweep, tmp_path):
+@pytest.mark.parametrize(("name", "fewest"), [("forces", 80), ("gaps", 2)])
+def test_small_values_of_each_shape(name, fewest, report, sweep, tmp_path):
     out = tmp_path / "f.png"
-    found = report(f"{FOLDER}/forces.py", sweep, "--out", out)
+    found = report(f"{FOLDER}/{name}.py", sweep, "--out", out)
     image(out)
-    Deltas = sorted(row["Delta"] for row in found["forces"])
+    Deltas = sorted(row["Delta"] for row in found[name])
     assert Deltas == pytest.approx([0, *sorted(1 / w1 - 1 for w1 in W1)], abs=1e-8)
-    assert all(row["bonds"] > 80 for row in found["forces"])
+    assert all(row["count"] > fewest for row in found[name])
 
 
-@pytest.mark.parametrize("theta", [0.0, 0.175, 0.423])
-def test_exponents_of_forces_are_found(theta, monkeypatch):
-    monkeypatch.syspath_prepend(ANALYSIS / FOLDER)
-    exponent_of = runpy.run_path(str(ANALYSIS / FOLDER / "forces.py"))["exponent_of"]
+def test_gaps_of_discs_are_their_distances(sweep):
+    gaps_of = runpy.run_path(str(ANALYSIS / FOLDER / "gaps.py"))["gaps_of"]
+    file = PackingFile.read(sweep / "0_1.h5")
+    packing, rattlers = file.packing(), file.contacts().rattlers
+    i, j = np.triu_indices(packing.n, 1)
+    held = ~(rattlers[i] | rattlers[j])
+    edges = packing.box.edges
+    apart = packing.position[i] - packing.position[j]
+    r = np.linalg.norm(apart - edges * np.rint(apart / edges), axis=1)
+    gaps = (r / (packing.radius[i] + packing.radius[j]) - 1)[held]
+    expected = np.sort(gaps[(gaps > 1e-7) & (gaps < 0.2)])
+    np.testing.assert_allclose(np.sort(gaps_of(file)), expected, rtol=0.06)
+
+
+def test_shear_modulus_of_each_shape(report, sweep, tmp_path):
+    ladder, out = tmp_path / "ladder", tmp_path / "s.png"
+    packings = sorted(sweep.glob("[01]_*.h5"))
+    energies = ("1e-12", "1e-8", "1e-6")
+    report("energy_ladder.py", *packings, "--u0", *energies, "--out", ladder)
+    found = report(f"{FOLDER}/shear_modulus.py", ladder, "--out", out)
+    image(out)
+    discs, ellipses = found["shapes"]
+    assert (discs["Delta"], ellipses["Delta"]) == pytest.approx((0, 1 / W1[0] - 1))
+    assert (discs["samples"], len(discs["points"])) == (2, len(energies))
+    moduli = [js.modes(js.load(ladder / f"0_{seed}_u1e-08.h5")).moduli for seed in (1, 2)]
+    G = np.mean([of.B.G_dc.relaxed / of.bulk.relaxed for of in moduli])
+    assert discs["points"][1]["G"] == pytest.approx(G, rel=1e-6)
+    assert discs["points"][0]["p"] < 1e-2 * discs["points"][1]["p"] * 1.1
+
+
+@pytest.mark.parametrize("theta", [-0.41, 0.0, 0.175, 0.423])
+def test_exponents_of_small_values_are_found(theta):
     uniform = (np.arange(20000) + 0.5) / 20000
     found, error = exponent_of(0.2 * uniform ** (1 / (1 + theta)), 0.2)
     assert found == pytest.approx(theta, abs=1e-3)

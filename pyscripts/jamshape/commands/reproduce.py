@@ -8,6 +8,7 @@
     jamshape reproduce marschall-shear
     jamshape reproduce brito-2018
     jamshape reproduce rocks-hoy-2023
+    jamshape reproduce heussinger-2020
 
 The scale `demo` takes minutes on two cores, `small` an hour, and `full`, with the papers' sizes, several hours.
 The last output is agreement.md, a page with every number beside the paper's, the figures, and a list of runs.
@@ -44,7 +45,7 @@ from jamshape.recording.workers import cores, python_path
 
 PAPERS = (
     "marschall-2018", "yuan-2019", "vanderwerf-2018", "zhang-2021", "marschall-shear", "brito-2018",
-    "rocks-hoy-2023",
+    "rocks-hoy-2023", "heussinger-2020",
 )  # fmt: skip
 SCALES = ("demo", "small", "full")
 

@@ -14,7 +14,7 @@ from jamshape.contacts.network import (
     sum_forces,
 )
 from jamshape.contacts.pairs import Pairs
-from jamshape.contacts.rattlers import Coordination, coordination, find_rattlers
+from jamshape.contacts.rattlers import Coordination, coordination, find_rattlers, is_grazing
 
 __all__ = [
     "Bonds",
@@ -32,5 +32,6 @@ __all__ = [
     "find_contacts",
     "find_rattlers",
     "forces",
+    "is_grazing",
     "sum_forces",
 ]

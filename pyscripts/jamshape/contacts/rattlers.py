@@ -80,7 +80,7 @@ def coordination(
     held = ~(rattlers[network.pairs[:, 0]] | rattlers[network.pairs[:, 1]])
     bonds = network.n_bonds[held]
     grazing = np.bincount(
-        network.bonds.contact[_is_grazing(network, held, grazing_below)], minlength=len(held)
+        network.bonds.contact[is_grazing(network, held, grazing_below)], minlength=len(held)
     )[held]
     if packing.dimension == 2:
         grazing = np.where(
@@ -101,8 +101,17 @@ def coordination(
     )
 
 
-def _is_grazing(network: ContactNetwork, held: BoolArray, below: float) -> BoolArray:
-    """Flag the bonds weaker than a fraction of the mean of those without rattlers, (B,)."""
+def is_grazing(network: ContactNetwork, held: BoolArray, below: float = GRAZING) -> BoolArray:
+    """Flag the bonds weaker than a fraction of the mean of those without rattlers, (B,).
+
+    Parameters
+    ----------
+    network : ContactNetwork
+    held : (M,) array of bool
+        Contacts that do not involve rattlers.
+    below : float
+        That fraction.
+    """
     force = np.linalg.norm(network.bonds.force, axis=1)
     counted = force[held[network.bonds.contact]]
     found: BoolArray = force < below * float(counted.mean() if len(counted) else 0.0)

@@ -1,0 +1,132 @@
+"""Distributions of small forces or gaps of round and of nearly round particles, and the powers that they begin with."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from common.axes import figure_of
+from common.ensembles import conditions, read_groups
+from common.families import family
+from common.styles import marked
+from common.text import conditions_text
+from jamshape.arrays import FloatArray
+from jamshape.command import report
+from jamshape.drawing.saving import save_figure
+from jamshape.files.ensembles import PackingFile, System
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_SURE = 2.0  # errors
+
+
+class Quantity(NamedTuple):
+    """A quantity whose small values x have the density x^(sign power)."""
+
+    name: str
+    """Plural, such as forces."""
+    label: str
+    """Label of an axis, in TeX."""
+    symbol: str
+    """Symbol of the power, in TeX."""
+    power: str
+    """Name of the power in JSON."""
+    sign: int
+    """1 if the density vanishes where the power is above 0, -1 if it diverges."""
+    bounds: tuple[float, ...]
+    """Largest values of further fits."""
+
+
+class Distribution(NamedTuple):
+    """Values of a system."""
+
+    system: System
+    Delta: float
+    """Aspect ratio less 1."""
+    values: FloatArray
+    """(B,) of all packings, ascending."""
+    power: float
+    error: float
+
+    @property
+    def has_power(self) -> int:
+        """1 if the power is above 0 by more than two errors."""
+        return int(self.power > _SURE * self.error)
+
+
+def exponent_of(values: FloatArray, below: float) -> tuple[float, float]:
+    """Estimate the exponent of a density x^exponent and its error from the values below a bound.
+
+    The maximum likelihood: 1 + exponent = 1 / <ln(below / x)>.
+
+    Examples
+    --------
+    >>> exponent, error = exponent_of(0.2 * np.linspace(0, 1, 100001)[1:], 0.2)  # uniform
+    >>> abs(exponent) < 1e-3, round(error, 4)
+    (True, 0.0032)
+    """
+    small = values[(values > 0) & (values <= below)]
+    if len(small) < 2:
+        return float("nan"), float("nan")
+    slope = 1 / float(np.mean(np.log(below / small)))
+    return slope - 1, slope / len(small) ** 0.5
+
+
+def power_of(of: Quantity, values: FloatArray, below: float) -> tuple[float, float]:
+    """Estimate the power of a quantity and its error."""
+    exponent, error = exponent_of(values, below)
+    return of.sign * exponent, error
+
+
+def figure_from(found: list[Distribution], of: Quantity, title: str, below: float) -> Figure:
+    """Draw cumulative distributions on the left and powers on the right."""
+    figure = figure_of(10.5, 4.4, dpi=90)
+    left, right = figure.subplots(1, 2)
+    for k, one in enumerate(found):
+        style = marked(k, "-")
+        label = rf"{family(one.system)}, $\Delta={one.Delta:.2g}$"
+        fraction = np.arange(1, len(one.values) + 1) / len(one.values)
+        line: dict[str, Any] = {"color": style["color"], "ls": ("-", "--")[k % 2], "lw": 1}
+        left.plot(one.values, fraction, **line, label=label)
+        right.errorbar(max(one.Delta, 1e-3), one.power, one.error, **style)
+    left.axvline(below, color="0.6", lw=0.8, ls=":")
+    left.set(xscale="log", yscale="log", xlim=(1e-4, None))
+    left.set_ylim(0.5 / max(len(one.values) for one in found), 1.3)
+    left.set(xlabel=of.label, ylabel=f"fraction of smaller {of.name}")
+    right.axhline(0, color="0.6", lw=0.8, ls=":")
+    right.set(xscale="log", ylabel=rf"exponent ${of.symbol}$ of small {of.name}")
+    right.set_xlabel(r"$\Delta$, aspect ratio $-\,1$ (discs at $10^{-3}$); $w_1=1/(1+\Delta)$")
+    figure.suptitle(title, fontsize=8)
+    left.legend(fontsize=7)
+    return figure
+
+
+def add_options(parser: ArgumentParser, below: float) -> None:
+    """Add the bound of the fit."""
+    parser.add_argument(
+        "--below", type=float, default=below, help="largest value of the fit (%(default)s)"
+    )
+
+
+def study(options: Namespace, of: Quantity, values_of: Callable[[PackingFile], FloatArray]) -> None:
+    """Read, fit, draw, report the values of each packing."""
+    groups = read_groups(options.files, needs=("aspect_ratio",))
+    found = []
+    for system, files in groups.items():
+        values = np.sort(np.concatenate([values_of(file) for file in files]))
+        Delta = files[0].number("aspect_ratio") - 1
+        found.append(Distribution(system, Delta, values, *power_of(of, values, options.below)))
+    found.sort(key=lambda one: one.Delta)
+    title = conditions_text(groups, bars=False)
+    save_figure(figure_from(found, of, title, options.below), options.out)
+    rows = [
+        {"family": family(one.system), "Delta": round(one.Delta, 9), "count": len(one.values)}
+        | {of.power: one.power, f"{of.power}_error": one.error, "has_power": one.has_power}
+        | {"by_bound": [(below, *power_of(of, one.values, below)) for below in of.bounds]}
+        for one in found
+    ]
+    report({"out": options.out, "conditions": conditions(groups), of.name: rows})
