@@ -25,10 +25,11 @@ _SMALLEST_STEP = 1e-9
 # Most openings of a jammed packing, each by at most a factor of 4 in sqrt(U).
 _MOST_OPENINGS = 30
 
-_PART = 2000  # evaluations after which a long minimisation is reported and stored
-_MOST_PARTS = 100  # of them before it is given up
+_PART = 5000  # evaluations after which a long minimisation is reported and stored
+_MOST_PARTS = 40  # of them before it is given up
+_BRIEF = 2000  # evaluations of a first part after which the next step may be taken
 
-# Before a search for an energy the box is compressed further after one part, once in a row, if U/N is below a multiple
+# Before a search for an energy the box is compressed further after a brief part, once in a row, if U/N is below a multiple
 # of the energy tolerance, about what a step adds to a jammed packing: the search opens it again, while the evaluations
 # to the end of such a minimisation grow with N. A multiple of energies of harmonic contacts.
 _LITTLE = 50.0
@@ -273,7 +274,9 @@ def _minimised(landscape: Landscape, compression: QuasistaticRun, protocol: Quas
     """Minimise until forces balance, or until the state is unjammed."""
     state = compression.state
     lowest = protocol.energy * landscape.particles.n / state.volume
-    stop = Stop(tolerance=protocol.tolerance, lowest=lowest, evaluations=_PART)
+    may_be_left = _is_rough(protocol) and not compression.left and compression.parts == 0
+    most = _BRIEF if may_be_left else _PART
+    stop = Stop(tolerance=protocol.tolerance, lowest=lowest, evaluations=most)
     is_near = compression.openings > 0 and protocol.method == "auto"
     method = "near" if is_near else protocol.method
     found = minimise(landscape, state, method, stop, compression.history)
