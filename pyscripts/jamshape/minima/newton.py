@@ -63,8 +63,11 @@ def _run(descent: Descent, newton_below: float, patience: int, *, is_near: bool 
 
 
 def _on_a_corner(descent: Descent) -> Outcome | None:
-    """Relax a state that oscillates across a kink onto it; None without a kink."""
-    if descent.outcome() is not None:
+    """Relax a state that oscillates across a kink onto it; None without a kink.
+
+    Forces between round particles are continuous.
+    """
+    if descent.outcome() is not None or descent.landscape.particles.is_round.all():
         return None
     found = at_rest(descent.landscape, descent.state, descent.stop.tolerance)
     if found is None:
