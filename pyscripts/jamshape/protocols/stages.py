@@ -229,9 +229,7 @@ class Searching:
                 f" {making.target.u0:.3g}; use a start nearer to jamming, or extrapolation"
             )
             raise TargetError(msg)
-        text = (
-            f"{_where(search, making.target, last, making.landscape.law)}, minimisation {self._n}"
-        )
+        text = f"{progress_of(search, making.target, last, making.landscape.law)}, minimisation {self._n}"
         return making.told(f"search for u0 = {making.target.u0:g}", text, search.state)
 
     def checkpoint(self) -> Checkpoint:
@@ -250,16 +248,15 @@ class Searching:
         }
 
 
-def _where(search: Search, target: Target, last: float, law: Interaction) -> str:
+def progress_of(search: Search, target: Target, last: float, law: Interaction) -> str:
     """Describe where a search is; `last` is u before its last step."""
     u, residual = search.history.energy_density[-1], search.history.residual[-1]
     ratio = f"u/u0 {u / target.u0:.3g}" if u > 0 else "unjammed"
     text = f"u {u:.2e}, {ratio}, residual {residual:.1e} of {target.tolerance:.0e}, step {search.step:.1e}"
-    if not target.u0 < u < last:
-        return text
     # Equal steps down to u0, estimated from the root of u that is linear in the strain.
-    now, before, aim = map(law.root, (u, last, target.u0))
-    return f"{text}, about {math.ceil((now - aim) / (before - now))} more of it"
+    now, before, aim = map(law.root, (max(u, 0.0), last, target.u0))
+    steps = (now - aim) / (before - now) if aim < now < before else math.inf
+    return f"{text}, about {math.ceil(steps)} more of it" if steps < MOST_MINIMISATIONS else text
 
 
 class Settling:

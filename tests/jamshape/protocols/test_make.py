@@ -1,3 +1,4 @@
+import math
 from dataclasses import replace
 from functools import cache
 
@@ -22,11 +23,12 @@ from jamshape.files.h5md import (
 from jamshape.landscape import Landscape, State
 from jamshape.measures.packing_summary import measure, summary_of, write_minimum
 from jamshape.minima import residual_of
-from jamshape.minima.target import Target, find
-from jamshape.protocols import approach
+from jamshape.minima.target import Search, Target, find
+from jamshape.protocols import approach, stages
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.make import Dynamics, Recipe, is_done, make, require_same
-from jamshape.protocols.random_start import InsertionError
+from jamshape.protocols.random_start import InsertionError, random_packing
+from jamshape.shapes.shape import Interaction
 
 U0 = 1e-12
 RECIPE = Recipe(bidisperse(1.0), n=16, phi_start=0.5, target=Target(U0))
@@ -384,3 +386,15 @@ def test_a_kill_where_the_rate_changes_is_gone_on_from_to_the_bit(tmp_path, monk
     for name in ("kappa", "phi", "pressure"):
         np.testing.assert_array_equal(other[name], one[name])
     np.testing.assert_array_equal(read_packing(cut).position, read_packing(whole).position)
+
+
+@pytest.mark.parametrize(
+    ("last", "is_told"),
+    [(math.nan, False), (1e-14, False), (math.nextafter(1e-14, 1.0), False), (1.6e-13, True)],
+)
+def test_what_is_left_of_a_search_is_told_where_its_energy_falls(last, is_told):
+    """Energies may differ by rounding alone, as in a packing of 256 nearly round rods."""
+    search = Search(State.of(random_packing(4, 0.1, 1)), 1e-4)
+    search.history.add(1, 1e-9, 1e-14)
+    text = stages.progress_of(search, Target(u0=1e-15), last, Interaction())
+    assert ("more of it" in text) is is_told
