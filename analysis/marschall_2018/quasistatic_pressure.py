@@ -19,6 +19,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from tqdm import tqdm
 
 from jamshape.checks import require_positive
@@ -26,7 +27,7 @@ from jamshape.command import parser_of, report, run
 from jamshape.files.ensembles import PackingFile
 from jamshape.files.outcomes import shortfall
 from jamshape.landscape import Landscape, State
-from jamshape.measures.packing_summary import write_minimum
+from jamshape.measures.packing_summary import energy_onset, write_minimum
 from jamshape.minima import Minimum
 from jamshape.minima.target import Target
 from jamshape.protocols.ladder import bring
@@ -37,9 +38,8 @@ from common.ensembles import finished
 
 COLUMNS = ("phi", "pressure", "u")
 
-# Factor in the energy density between two states of the opening box, and their accuracy and tolerance but for the last.
-FACTOR = 4.0
-ROUGH_ACCURACY, ROUGH_TOLERANCE = 1e-2, 1e-4
+# Energy density over its target from which the search for it takes over from steps that halve phi - phi_J.
+NEAR = 1e6
 
 # Attributes that identify the packing and that the opened one shares with it.
 KEPT = ("alpha", "n", "seed", "size_ratio", "protocol")
@@ -57,29 +57,32 @@ def parser() -> ArgumentParser:
     return found
 
 
+def numbers(landscape: Landscape, state: State) -> dict[str, float]:
+    """Return phi, the pressure and the energy density of a state."""
+    found, volume = landscape.evaluate(state), state.volume
+    phi = float(landscape.particles.measures.sum()) / volume
+    pressure = -found.strain_gradient / (state.dimension * volume)
+    return {"phi": phi, "pressure": pressure, "u": found.energy / volume}
+
+
 def compressed(
     landscape: Landscape, state: State, phi_end: float, step: float
 ) -> Iterator[tuple[State, dict[str, float]]]:
     """Compress a packing by equal steps, and yield the minimum after each one with its numbers."""
-    measure = float(landscape.particles.measures.sum())
-    begun = measure / state.volume
-    n_steps = max(1, math.ceil((phi_end - begun) / step))
-    for k in range(n_steps + 1):
-        if k:
-            aim = begun + (phi_end - begun) * k / n_steps
-            state = compressed_to(landscape, state, aim, step=math.inf)
-        found, volume = landscape.evaluate(state), state.volume
-        pressure = -found.strain_gradient / (state.dimension * volume)
-        yield state, {"phi": measure / volume, "pressure": pressure, "u": found.energy / volume}
+    row = numbers(landscape, state)
+    yield state, row
+    for phi in np.linspace(row["phi"], phi_end, math.ceil((phi_end - row["phi"]) / step) + 1)[1:]:
+        state = compressed_to(landscape, state, float(phi), step=math.inf)
+        yield state, numbers(landscape, state)
 
 
-def opened(landscape: Landscape, state: State, u: float, target: Target) -> Minimum:
+def opened(landscape: Landscape, state: State, target: Target) -> Minimum:
     """Open the box to the target energy, in steps that the particles can follow."""
-    energies = [target.u0]
-    while energies[-1] * FACTOR < u:
-        energies.append(energies[-1] * FACTOR)
-    for u0 in reversed(energies[1:]):
-        state = bring(landscape, state, Target(u0, ROUGH_ACCURACY, ROUGH_TOLERANCE)).state
+    row = numbers(landscape, state)
+    while row["u"] > NEAR * target.u0:
+        onset = energy_onset(row["phi"], row["u"], row["pressure"], landscape.law.power)
+        state = compressed_to(landscape, state, (row["phi"] + onset) / 2, step=math.inf)
+        row = numbers(landscape, state)
     return bring(landscape, state, target)
 
 
@@ -99,7 +102,7 @@ def treat(source: PackingFile, options: Namespace) -> dict[str, Any]:
         writer.writerows(rows)
     u0 = options.u0 or source.number("u0")
     target = Target(u0, source.number("accuracy"), source.number("tolerance"))
-    minimum = opened(landscape, state, rows[-1]["u"], target)
+    minimum = opened(landscape, state, target)
     told = {name: source.attributes[name] for name in KEPT if name in source.attributes}
     told |= {name: getattr(target, name) for name in ("u0", "accuracy", "tolerance")}
     told |= {"phi_end": options.phi_end, "step": options.step, "evaluations": landscape.evaluations}
