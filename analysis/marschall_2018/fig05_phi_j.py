@@ -23,6 +23,8 @@ from jamshape.command import parser_of, report, run
 from jamshape.drawing.saving import save_figure
 from jamshape.files.ensembles import PackingFile, System
 from jamshape.measures.averages import Mean
+from jamshape.measures.packing_summary import energy_onset
+from jamshape.shapes.shape import Interaction
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.averages import mean_over
@@ -46,6 +48,15 @@ Averages = dict[str, dict[float, Mean]]
 def averages(curve: Curve) -> Averages:
     """Average over the samples of each alpha, those left out that do not know."""
     return {name: {alpha: average(of, name) for alpha, of in curve.items()} for name in WAYS}
+
+
+def distance(samples: Sequence[PackingFile]) -> Mean:
+    """Average phi - phi_J; from energy and pressure, since the difference of both has few digits in a table."""
+    known = [s for s in samples if {"phi", "u", "pressure"} <= s.attributes.keys()]
+    powers = [Interaction.told(s.attributes).power for s in known]
+    phi, u, pressure = ([s.number(name) for s in known] for name in ("phi", "u", "pressure"))
+    onsets = map(energy_onset, phi, u, pressure, powers)
+    return mean_over(known, [at - onset for at, onset in zip(phi, onsets, strict=True)])
 
 
 def average(samples: Sequence[PackingFile], name: str) -> Mean:
@@ -79,13 +90,14 @@ def draw(known: dict[System, Averages], groups: Groups, options: Namespace) -> N
     save_figure(figure, options.out)
 
 
-def rows(system: System, known: Averages) -> list[dict[str, Any]]:
+def rows(system: System, known: Averages, curve: Curve) -> list[dict[str, Any]]:
     """Report the averages of one curve."""
     paper = PHI_J if of_paper(system) else {}
     return [
         system.report()
         | {"alpha": alpha, "paper": paper[alpha].value if alpha in paper else None}
         | {name: of[alpha] for name, of in known.items()}
+        | {"distance": distance(curve[alpha])}
         for alpha in known["phi_J"]
     ]
 
@@ -93,12 +105,13 @@ def rows(system: System, known: Averages) -> list[dict[str, Any]]:
 def main(options: Namespace) -> None:
     """Read, average, draw, report."""
     groups = read_groups(options.files, needs=["alpha"], same=("n", "size_ratio", "u0"))
-    known = {system: averages(curve) for system, curve in curves_over(groups, "alpha").items()}
+    curves = curves_over(groups, "alpha")
+    known = {system: averages(curve) for system, curve in curves.items()}
     if not np.isfinite([m.value for of in known.values() for m in of["phi_J"].values()]).all():
         msg = f"{options.files[0]}: phi_J is not known at some alpha, expected it of each packing"
         raise ValueError(msg)
     draw(known, groups, options)
-    found = [row for system, of in known.items() for row in rows(system, of)]
+    found = [row for system, of in known.items() for row in rows(system, of, curves[system])]
     report({"out": options.out, "conditions": conditions(groups), "phi_J": found})
 
 
