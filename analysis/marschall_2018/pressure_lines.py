@@ -7,8 +7,8 @@ sample_tables.py, with their pressures in the folders that it names. A line is f
 whose pressures are between two values, --windows, anew after each drop of the pressure, and its zero is averaged over samples, with standard errors; bars
 over the axis of pressure show these values. Below jamming the pressure of a driven packing is viscous, and such lines vanish
 where flow begins; above it plastic events lower the pressure, and lines beyond the first of them vanish above the first
-jamming of the packing. Horizontal lines are the first jamming of the packings of FOLDER, zeros of lines through the rise after the
-first plastic drop, phi_J after the box was opened again, and the paper's phi_J. The last line of standard output is one JSON object.
+jamming of the packing. Horizontal lines are the first jamming of the packings of FOLDER, phi_J after the box was opened
+again, and the paper's phi_J. The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations
@@ -47,7 +47,6 @@ if TYPE_CHECKING:
 WINDOWS = ("5e-4,2e-3", "1e-3,3e-3", "2e-3,5e-3", "5e-3,1e-2")
 FEWEST = 4  # rows of a line
 DROP = 0.02  # relative fall of the pressure that ends a line
-GROWTH = 2.0  # largest pressure of the line after the first drop, over the smallest
 QUASISTATIC = 0.0  # in place of a rate
 
 
@@ -77,8 +76,8 @@ class Opened(NamedTuple):
     """phi_J before, the first jamming."""
     end: float
     """phi from which it was opened."""
-    after_drop: float
-    """Zero of the line after the first plastic drop."""
+    drop: float
+    """Pressure from which it dropped first; NaN if it never did."""
     file: PackingFile
     """The packing that is left."""
 
@@ -152,18 +151,10 @@ def zero_of(curve: Curve, window: Window) -> float:
     return float(np.average(zeros, weights=weights)) if zeros else math.nan
 
 
-def zero_after_drop(curve: Curve) -> float:
-    """Return the zero of the line through the rise after the first drop, up to GROWTH times the pressure where it begins.
-
-    NaN if there is no such rise.
-    """
-    later = [
-        part for part in rises(curve.pressure) if part.start and part.stop - part.start >= FEWEST
-    ]
-    if not later:
-        return math.nan
-    after = Curve(curve.phi[later[0]], curve.pressure[later[0]])
-    return zero_of(after, Window(after.pressure[0], GROWTH * after.pressure[0]))
+def first_drop(curve: Curve) -> float:
+    """Return the pressure from which it dropped first; NaN if it never did."""
+    first, *later = rises(curve.pressure)
+    return float(curve.pressure[first].max()) if later else math.nan
 
 
 def read_quasistatic(folders: list[Path]) -> tuple[dict[Place, Rates], dict[Place, list[Opened]]]:
@@ -179,7 +170,7 @@ def read_quasistatic(folders: list[Path]) -> tuple[dict[Place, Rates], dict[Plac
         curves.setdefault(place, {}).setdefault(QUASISTATIC, []).append(curve)
         first = energy_onset(*(float(values[0]) for values in (phi, u, pressure)))
         packings.setdefault(place, []).append(
-            Opened(first, float(phi[-1]), zero_after_drop(curve), file)
+            Opened(first, float(phi[-1]), first_drop(curve), file)
         )
     return curves, packings
 
@@ -216,7 +207,6 @@ def draw_levels(axes: Axes, system: System, packings: list[Opened]) -> None:
     """Draw first jamming, phi_J after opening, and the paper's phi_J as horizontal lines."""
     levels = {
         r"first jamming, $\phi_J={}$": ("-", mean([one.first for one in packings])),
-        r"after the first drop, $\phi_J={}$": (":", mean([one.after_drop for one in packings])),
         r"opened again, $\phi_J={}$": ("-.", opened_of(packings)),
     }
     for text, (line, found) in levels.items():
@@ -245,7 +235,7 @@ def draw(
 ) -> None:
     """Draw a panel for each system."""
     figure = figure_of(4.2 * len(curves), 4.4)
-    panels = figure.subplots(1, len(curves), squeeze=False)[0]
+    panels = figure.subplots(1, len(curves), squeeze=False, sharex=True)[0]
     for axes, ((system, n), rates) in zip(panels, curves.items(), strict=True):
         draw_system(axes, rates, options.windows)
         draw_levels(axes, system, packings.get(Place(system, n), []))
@@ -277,7 +267,7 @@ def packings_of(packings: dict[Place, list[Opened]]) -> list[dict[str, Any]]:
         files = [one.file for one in every]
         row = place.system.report() | {"n": place.n, "phi_end": max(one.end for one in every)}
         row |= {"first": mean([one.first for one in every]), "opened": opened_of(every)}
-        row["after_drop"] = mean([one.after_drop for one in every])
+        row["drops"] = [one.drop for one in every]
         row["rise"] = mean([one.file.number("phi_J") - one.first for one in every])
         row["distance"] = mean_over(files, [f.number("phi") - f.number("phi_J") for f in files])
         for name in ("z", "z_bearing"):

@@ -155,7 +155,7 @@ def rates(tmp_path_factory):
     """Three samples at two rates, of which the slower one begins later; in one file each."""
     folder = tmp_path_factory.mktemp("rates")
     onsets = {1: 0.0, 2: 0.002, 3: 0.01}
-    cost = {"flow_evaluations": 100, "flow_strain": 0.05, "flow_wall_seconds": 1.5}
+    cost = {"flow_evaluations": 100, "flow_wall_seconds": 1.5}
     paths = []
     for seed, onset in onsets.items():
         of = {"seed": seed, "ends": (0.84, 0.9)}
@@ -179,8 +179,18 @@ def test_rates_are_compared_sample_by_sample(report, rates, tmp_path):
     assert fast["excess"]["value"] > 0.1
     assert slow["shift"] is slow["excess"] is None
     assert (slow["evaluations"], slow["seconds"], fast["evaluations"]) == (100, 1.5, None)
-    assert slow["heun"] == pytest.approx(2 * 0.05 / (1e-10 * 0.01) / 100)
+    strain = np.log(0.9 / 0.84) / 2
+    assert slow["heun"] == pytest.approx(2 * strain / (1e-10 * 0.01) / 100)
     image(tmp_path / "slow.png")
+
+
+def test_steps_of_heun_are_counted_at_the_rates_that_held(report, tmp_path):
+    cost = {"flow_evaluations": 10, "flow_wall_seconds": 1.5}
+    kappa = np.array([[0.0, 1e-6], [0.85, 1e-8]])
+    one = compression(tmp_path / "run.h5", ends=(0.8, 0.9), kappa=kappa, **cost)
+    [row] = report(SLOW, one, "--out", tmp_path / "slow.png")["rows"]
+    time = np.log(0.85 / 0.8) / 2 / 1e-6 + np.log(0.9 / 0.85) / 2 / 1e-8
+    assert row["heun"] == pytest.approx(2 * time / 0.01 / 10)
 
 
 def test_one_sample_has_the_error_of_its_fit_and_packings_are_marked(here, capsys, rates, tmp_path):
