@@ -23,13 +23,19 @@ from jamshape.command import parser_of, report, run
 from jamshape.drawing.saving import save_figure
 from jamshape.files.ensembles import PackingFile, System
 from jamshape.measures.averages import Mean
-from jamshape.measures.packing_summary import energy_onset
-from jamshape.shapes.shape import Interaction
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.averages import mean_over
 from common.axes import SMALL_TEXT, discs_at, error_bars, figure_of, label_alpha_axis
-from common.ensembles import Curve, Groups, conditions, curves_over, of_paper, read_groups
+from common.ensembles import (
+    Curve,
+    Groups,
+    conditions,
+    curves_over,
+    distances,
+    of_paper,
+    read_groups,
+)
 from common.published import PHI_J
 from common.styles import PAPER_STYLE, color
 from common.text import conditions_text, system_labels
@@ -51,12 +57,9 @@ def averages(curve: Curve) -> Averages:
 
 
 def distance(samples: Sequence[PackingFile]) -> Mean:
-    """Average phi - phi_J; from energy and pressure, since the difference of both has few digits in a table."""
+    """Average phi - phi_J over samples that know their energy and pressure."""
     known = [s for s in samples if {"phi", "u", "pressure"} <= s.attributes.keys()]
-    powers = [Interaction.told(s.attributes).power for s in known]
-    phi, u, pressure = ([s.number(name) for s in known] for name in ("phi", "u", "pressure"))
-    onsets = map(energy_onset, phi, u, pressure, powers)
-    return mean_over(known, [at - onset for at, onset in zip(phi, onsets, strict=True)])
+    return mean_over(known, distances(known))
 
 
 def average(samples: Sequence[PackingFile], name: str) -> Mean:

@@ -35,7 +35,7 @@ from jamshape.measures.runs import read_run
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.averages import mean, mean_over
 from common.axes import SMALL_TEXT, figure_of
-from common.ensembles import finished, of_paper
+from common.ensembles import distances, finished, of_paper
 from common.mode_axes import energy_text
 from common.published import PHI_J
 from common.styles import PAPER_LINE, marked
@@ -269,7 +269,7 @@ def packings_of(packings: dict[Place, list[Opened]]) -> list[dict[str, Any]]:
         row |= {"first": mean([one.first for one in every]), "opened": opened_of(every)}
         row["drops"] = [one.drop for one in every]
         row["rise"] = mean([one.file.number("phi_J") - one.first for one in every])
-        row["distance"] = mean_over(files, [f.number("phi") - f.number("phi_J") for f in files])
+        row["distance"] = mean_over(files, distances(files))
         for name in ("z", "z_bearing"):
             row[name] = mean_over(files, [file.number(name) for file in files])
         found.append(row)
