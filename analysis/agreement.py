@@ -39,15 +39,16 @@ from jamshape.lammps.plugin import PluginError, built_for, plugin_path
 
 HERE = Path(__file__).parent
 WITHIN = 2.0  # joint errors
-AGREES, DIFFERS, UNJUDGED, UNMEASURED = (
-    "agrees", "differs", "not judged", "not measured at this scale"
+AGREES, AS_COUNTED, DIFFERS, UNJUDGED, UNMEASURED = VERDICTS = (
+    "agrees", "agrees as the paper counted", "differs", "not judged", "not measured at this scale"
 )  # fmt: skip
 
 RULE = f"""\
 The joint error is the root of the sum of the squares of both errors; ours is the standard error of the mean over
 samples, or that of a fit. Errors stand in brackets, in units of the last digit. The column of joint errors has the
 difference of both numbers. A number of ours *{AGREES}* if it differs from the paper's by at most {WITHIN:g} joint errors,
-and *{DIFFERS}* if by more. What the paper states exactly, with an error of 0, must be the same. A number is *{UNJUDGED}*
+and *{DIFFERS}* if by more; it *{AS_COUNTED}* if it differs, while another row, with the same quantity counted as the
+paper did, agrees. What the paper states exactly, with an error of 0, must be the same. A number is *{UNJUDGED}*
 where there is no error of ours, as of a single sample, or where what the paper counts was found in no sample. It is
 *{UNMEASURED}* where there is no such number. Averages are over all packings; where forces do not balance in some, the
 average over the others stands beside it.
@@ -72,6 +73,8 @@ class Published(NamedTuple):
     per: str
     """Path of the divisor of the result; empty for none."""
     remark: str
+    counted: str = ""
+    """Quantity of the row that counts as the paper did, if this one does not."""
 
 
 class Ours(NamedTuple):
@@ -124,16 +127,14 @@ def read_paper(path: Path) -> list[Published]:
     Raises
     ------
     ValueError
-        If a column is missing, or a value or an error is no number.
+        If a column is missing, a value or an error is no number, or `counted` names no row.
     """
     with path.open(newline="", encoding="utf-8") as file:
         found = list(csv.DictReader(file))
-    rows = []
+    rows, needed = [], [n for n in Published._fields if n not in Published._field_defaults]
     for line, row in enumerate(found, 2):
-        if missing := [name for name in Published._fields if row.get(name) is None]:
-            msg = (
-                f"{path}, line {line}: has no {missing[0]}, expected {', '.join(Published._fields)}"
-            )
+        if missing := [name for name in needed if row.get(name) is None]:
+            msg = f"{path}, line {line}: has no {missing[0]}, expected {', '.join(needed)}"
             raise ValueError(msg)
         numbers: dict[str, Any] = {}
         for name in ("value", "error"):
@@ -142,8 +143,12 @@ def read_paper(path: Path) -> list[Published]:
             except ValueError:
                 msg = f"{path}, line {line}: {name} is {row[name]!r}, expected a number"
                 raise ValueError(msg) from None
-        told: dict[str, Any] = {name: row[name] for name in Published._fields} | numbers
-        rows.append(Published(**told))
+        told: dict[str, Any] = {name: row[name] for name in Published._fields if name in row}
+        rows.append(Published(**told | numbers))
+    known = {row.quantity for row in rows}
+    if unknown := [row.counted for row in rows if row.counted and row.counted not in known]:
+        msg = f"{path}: counted is {unknown[0]!r}, expected the quantity of another row"
+        raise ValueError(msg)
     return rows
 
 
@@ -261,7 +266,13 @@ def rows_of(
         if ours is None:
             ours, made_by = known.get(published.quantity, (None, ""))
         found.append(judged(published, ours)._replace(commit=made_by))
-    return found
+    agreeing = {row.published.quantity for row in found if row.verdict == AGREES}
+    return [
+        row._replace(verdict=AS_COUNTED)
+        if row.verdict == DIFFERS and row.published.counted in agreeing
+        else row
+        for row in found
+    ]
 
 
 def judged(published: Published, ours: Ours | None) -> Row:
@@ -425,7 +436,7 @@ def where_it_ran(folder: Path, at: Mapping[str, Any]) -> str:
 def page(title: str, rows: Sequence[Row], options: Namespace, at: Mapping[str, Any]) -> str:
     """Write the page."""
     counts = Counter(row.verdict for row in rows)
-    summary = ", ".join(f"{counts[v]} *{v}*" for v in (AGREES, DIFFERS, UNJUDGED, UNMEASURED))
+    summary = ", ".join(f"{counts[v]} *{v}*" for v in VERDICTS)
     figures = sorted(path.name for path in (options.folder / "figures").glob("*.png"))
     return "\n\n".join(
         (
@@ -519,7 +530,7 @@ def main(options: Namespace) -> None:
     options.out.write_text(text, encoding="utf-8")
     write_tables(options.out, rows, jobs_of(options.folder, options.known))
     counts = Counter(row.verdict for row in rows)
-    verdicts = {name: counts[name] for name in (AGREES, DIFFERS, UNJUDGED, UNMEASURED)}
+    verdicts = {name: counts[name] for name in VERDICTS}
     report({"out": options.out, "figures": len(results), **verdicts})
 
 

@@ -39,7 +39,7 @@ PACKING = (
     "z_bearing", "n_rattlers", "n_bonds", "S2", "S4", "C4", "residual_force", "residual_torque", "tolerance", "outcome", "wall_seconds",
 )  # fmt: skip
 RUN = (
-    *SHAPE, "kappa", "phi_start", "phi_end", "method", "phi_unjams", "phi_jams", "frames_minimised",
+    *SHAPE, "sides", "kappa", "phi_start", "phi_end", "method", "phi_unjams", "phi_jams", "frames_minimised",
     "frames_undecided", "flow_steps", "flow_evaluations", "flow_wall_seconds",
 )  # fmt: skip
 MODES = (

@@ -17,6 +17,8 @@ import numpy as np
 
 from jamshape.files.ensembles import PackingFile, System
 from jamshape.files.h5md import FileFormatError
+from jamshape.measures.packing_summary import energy_onset
+from jamshape.shapes.shape import Interaction
 from jamshape.shapes.table import DEFAULT
 
 # Suffixes of other files that may lie beside a packing.
@@ -134,6 +136,14 @@ def _read(text: str) -> Any:
         with contextlib.suppress(ValueError):
             return kind(text)
     return text
+
+
+def distances(files: Sequence[PackingFile]) -> list[float]:
+    """Return phi - phi_J of packings, from energy and pressure: the difference of both has few digits in a table."""
+    powers = [Interaction.told(file.attributes).power for file in files]
+    phi, u, pressure = ([f.number(name) for f in files] for name in ("phi", "u", "pressure"))
+    onsets = map(energy_onset, phi, u, pressure, powers)
+    return [at - onset for at, onset in zip(phi, onsets, strict=True)]
 
 
 def require_one_ensemble(attributes: Sequence[Mapping[str, Any]], same: Sequence[str]) -> None:

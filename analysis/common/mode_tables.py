@@ -25,6 +25,9 @@ from jamshape.vibration.table import ModeTable, read_modes, tabulate
 # Common to all packings of a figure.
 ENSEMBLE = ("n", "size_ratio")
 
+# Modes that each band gains for each grazing bond that is left out, which a mode of the low band then no longer stretches.
+BY_GRAZING = {"low": 1, "middle": 0, "high": -1}
+
 Tables = dict[Key, list[ModeTable]]
 
 

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
@@ -138,8 +139,20 @@ def cost_of(one: Run) -> Cost | None:
     if "flow_evaluations" not in attributes:
         return None
     evaluations = float(attributes["flow_evaluations"])
-    heun = 2 * float(attributes["flow_strain"]) / (one.ensemble.kappa * HEUN_DT)
+    heun = 2 * duration(one, attributes["kappa"]) / HEUN_DT
     return Cost(evaluations, heun / evaluations, float(attributes["flow_wall_seconds"]))
+
+
+def duration(one: Run, kappa: ArrayLike) -> float:
+    """Time of a run whose rates hold from packing fractions on, [[phi, kappa], ...], or are one number.
+
+    The box shrinks with dL/dt = -kappa L, so that a packing fraction grows with D kappa phi.
+    """
+    rates = np.asarray(kappa, np.float64)
+    begin, rate = rates.reshape(-1, 2).T if rates.size > 1 else np.array([[0.0], [float(rates)]])
+    held = rate[np.searchsorted(begin, one.phi[:-1], side="right") - 1]
+    strain = np.diff(np.log(one.phi)) / one.ensemble.system.dimension
+    return float((strain / held).sum())
 
 
 def draw(rates: list[Rate], packings: dict[Place, list[float]], out: Path) -> None:

@@ -27,7 +27,15 @@ from jamshape.measures.averages import Mean
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.averages import mean_over
 from common.axes import SMALL_TEXT, discs_at, error_bars, figure_of, label_alpha_axis
-from common.ensembles import Curve, Groups, conditions, curves_over, of_paper, read_groups
+from common.ensembles import (
+    Curve,
+    Groups,
+    conditions,
+    curves_over,
+    distances,
+    of_paper,
+    read_groups,
+)
 from common.published import PHI_J
 from common.styles import PAPER_STYLE, color
 from common.text import conditions_text, system_labels
@@ -46,6 +54,12 @@ Averages = dict[str, dict[float, Mean]]
 def averages(curve: Curve) -> Averages:
     """Average over the samples of each alpha, those left out that do not know."""
     return {name: {alpha: average(of, name) for alpha, of in curve.items()} for name in WAYS}
+
+
+def distance(samples: Sequence[PackingFile]) -> Mean:
+    """Average phi - phi_J over samples that know their energy and pressure."""
+    known = [s for s in samples if {"phi", "u", "pressure"} <= s.attributes.keys()]
+    return mean_over(known, distances(known))
 
 
 def average(samples: Sequence[PackingFile], name: str) -> Mean:
@@ -79,13 +93,14 @@ def draw(known: dict[System, Averages], groups: Groups, options: Namespace) -> N
     save_figure(figure, options.out)
 
 
-def rows(system: System, known: Averages) -> list[dict[str, Any]]:
+def rows(system: System, known: Averages, curve: Curve) -> list[dict[str, Any]]:
     """Report the averages of one curve."""
     paper = PHI_J if of_paper(system) else {}
     return [
         system.report()
         | {"alpha": alpha, "paper": paper[alpha].value if alpha in paper else None}
         | {name: of[alpha] for name, of in known.items()}
+        | {"distance": distance(curve[alpha])}
         for alpha in known["phi_J"]
     ]
 
@@ -93,12 +108,13 @@ def rows(system: System, known: Averages) -> list[dict[str, Any]]:
 def main(options: Namespace) -> None:
     """Read, average, draw, report."""
     groups = read_groups(options.files, needs=["alpha"], same=("n", "size_ratio", "u0"))
-    known = {system: averages(curve) for system, curve in curves_over(groups, "alpha").items()}
+    curves = curves_over(groups, "alpha")
+    known = {system: averages(curve) for system, curve in curves.items()}
     if not np.isfinite([m.value for of in known.values() for m in of["phi_J"].values()]).all():
         msg = f"{options.files[0]}: phi_J is not known at some alpha, expected it of each packing"
         raise ValueError(msg)
     draw(known, groups, options)
-    found = [row for system, of in known.items() for row in rows(system, of)]
+    found = [row for system, of in known.items() for row in rows(system, of, curves[system])]
     report({"out": options.out, "conditions": conditions(groups), "phi_J": found})
 
 

@@ -6,7 +6,8 @@ MODES are files of analysis/modes.py, or folders of them. One curve for each sys
 samples with standard errors; --alpha and --u0 select. The integral is 1; the rotations of discs, at
 omega = 0, count in it and are not drawn, translations are left out. Modes of negative eigenvalue are drawn apart, on the left. Stars are
 the frequencies of bands that the paper names. The last line of standard output is one JSON object with
-the fractions of modes in each band, beside the paper's.
+the fractions of modes in each band, beside the paper's, and those (fraction_bearing) without the bonds that bear less than
+1e-6 of the mean force.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ from common.mode_axes import (
     modes_parser,
     tables_asked,
 )
-from common.mode_tables import Tables, every, sizes, stable, unstable
+from common.mode_tables import BY_GRAZING, Tables, every, sizes, stable, unstable
 from common.published import BANDS
 from common.styles import PAPER_STYLE, marked
 
@@ -64,6 +65,12 @@ def total(table: ModeTable) -> int:
     freedoms = {2: 3, 3: 6}[table.coordinates.dimension]
     n_translations = int(table.attributes["n_modes"]) - table.n_vibrational
     return freedoms * int(table.attributes["n_backbone"]) - n_translations
+
+
+def bearing(table: ModeTable, band: str) -> float:
+    """Fraction of all modes in a band without grazing bonds; NaN of a table that does not count them."""
+    grazing = table.attributes.get("n_grazing", np.nan)
+    return float((len(table.in_band(band)) + BY_GRAZING[band] * grazing) / total(table))
 
 
 def densities(samples: list[ModeTable], edges: FloatArray, *, below: bool) -> FloatArray:
@@ -157,7 +164,11 @@ def row_of(key: Key, samples: list[ModeTable]) -> dict[str, Any]:
         known = [t for t in samples if t.has_band(band)]
         fraction = mean([len(t.in_band(band)) / total(t) for t in known])
         counts = [int(unstable(t)[t.in_band(band)].sum()) for t in known]
-        found[band] = {"fraction": fraction, "unstable": counts, "paper": paper.get(band)}
+        found[band] = {
+            "fraction": fraction,
+            "fraction_bearing": mean([bearing(t, band) for t in known]),
+        }
+        found[band] |= {"unstable": counts, "paper": paper.get(band)}
     found["without_bands"] = sum("why_no_bands" in t.attributes for t in samples)
     found["unsure"] = sum(int((t["sign"][~t["is_translation"]] == 0).sum()) for t in samples)
     found["z"] = float(np.mean([t.attributes["z"] for t in samples]))

@@ -21,6 +21,7 @@ from jamshape.measures.averages import Mean
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.averages import mean
+from common.mode_tables import BY_GRAZING
 
 NEEDED = ("file", "alpha", "u0", "z", "n_backbone", "n_grazing", "low", "middle", "high")
 
@@ -45,8 +46,8 @@ def counts_of(row: dict[str, str]) -> Counts:
     modes = low + middle + high
     return Counts(
         *(z, z - 2 * grazing / backbone),
-        *(low / modes, (low + grazing) / modes),
-        *(high / modes, (high - grazing) / modes),
+        *(low / modes, (low + BY_GRAZING["low"] * grazing) / modes),
+        *(high / modes, (high + BY_GRAZING["high"] * grazing) / modes),
     )
 
 

@@ -45,29 +45,54 @@ add_modes(
 
 # The same packings at other energies, Figs. 14, 18 and 20; those that are not reached are left out.
 for alpha in OF_MODES[1:]:
-    ladder = f"ladder/alpha{alpha:g}"
-    add(
-        "ladder",
-        f"ladder_alpha{alpha:g}",
-        f'python "$analysis/energy_ladder.py" {words(packings(alpha, AT["ladder_samples"]))}'
-        f' --u0 {words(AT["ladder_u0"])} --out {ladder} || true; {modes_of(f"{ladder}/*.h5", "ladder")}',
-        after=[f"rods_alpha{alpha:g}"],
-    )
+    for packing in packings(alpha, AT["ladder_samples"]):
+        ladder, name = f"ladder/alpha{alpha:g}", Path(packing).stem
+        add(
+            "ladder",
+            f"ladder_{name}",
+            f'python "$analysis/energy_ladder.py" {packing} --u0 {words(AT["ladder_u0"])} --out {ladder} || true;'
+            f" {modes_of(f'{ladder}/{name}_*.h5', 'ladder')}",
+            after=[f"rods_alpha{alpha:g}"],
+        )
+
+# And compressed by equal steps, for lines through a pressure without a rate, and opened again.
+for alpha, end in AT["above_phi"].items():
+    for packing in packings(float(alpha), AT["above_samples"]):
+        add(
+            "above",
+            f"above_{Path(packing).stem}",
+            f'python "$analysis/{FOLDER}/quasistatic_pressure.py" {packing} --phi-end {end} --out packings/above || true',
+            after=[f"rods_alpha{alpha}"],
+        )
 
 # Compressions at finite rates, Figs. 3 and 4.
-SLOW = {}
-for alpha, (start, slow, end) in AT["slow_phi"].items():
+SLOW, ONE_BOND = {}, []
+
+
+def add_slow(name, alpha, kappa, seed, options=""):
+    """Add a compression of an aspect ratio at a rate; return its file."""
+    start, slow, end = AT["slow_phi"][alpha]
+    add(
+        "slow",
+        name,
+        f"jamshape slow --alpha {alpha} --n {AT['slow_n']} --seed {seed} --kappa {kappa}{options}"
+        # The exit code is 1 where minimisations of frames came to no end, too, which the report counts.
+        f" --phi-start {start} --phi-slow {slow} --phi-end {end} --out runs/{name}.h5 || true",
+    )
+    return f"runs/{name}.h5"
+
+
+for alpha in AT["slow_phi"]:
     for kappa in AT["slow_kappas"]:
         for seed in range(1, AT["slow_samples"] + 1):
             name = f"slow_alpha{alpha}_kappa{kappa}_seed{seed}"
-            SLOW[alpha, kappa, seed] = f"runs/{name}.h5"
-            add(
-                "slow",
-                name,
-                f"jamshape slow --alpha {alpha} --n {AT['slow_n']} --seed {seed} --kappa {kappa}"
-                # The exit code is 1 where minimisations of frames came to no end, too, which the report counts.
-                f" --phi-start {start} --phi-slow {slow} --phi-end {end} --out runs/{name}.h5 || true",
-            )
+            SLOW[alpha, kappa, seed] = add_slow(name, alpha, kappa, seed)
+# With one bond side to side, as in the paper's dynamics.
+for alpha in AT["one_bond_alphas"]:
+    for kappa in AT["one_bond_kappas"]:
+        for seed in range(1, AT["one_bond_samples"] + 1):
+            name = f"one_bond_alpha{alpha}_kappa{kappa}_seed{seed}"
+            ONE_BOND.append(add_slow(name, alpha, kappa, seed, " --sides 1"))
 SLOWEST = [path for (alpha, kappa, _), path in SLOW.items() if (alpha, kappa) == ("4", AT["slow_kappas"][-1])]
 
 # Compressions for orientational order, Fig. 2: of two sizes of rods mixed, and of one size.
@@ -92,6 +117,8 @@ def draw(name, script, *inputs, after):
 
 draw("fig02", "fig02_order", ORDER, after=["order"])
 draw("fig03", "fig03_slow_compression", list(SLOW.values()), after=["slow"])
+draw("fig03_one_bond", "fig03_slow_compression", ONE_BOND, after=["slow"])
+draw("pressure_lines", "pressure_lines", list(SLOW.values()), "--quasistatic packings/above", after=["slow", "above"])
 draw("fig04", "fig04_pressure", SLOWEST, after=["slow"])
 draw("fig05", "fig05_phi_j", BOTH, after=["rods", "published"])
 draw("fig07", "fig07_snapshots", RODS, "--alpha 0.01 4", after=["rods"])

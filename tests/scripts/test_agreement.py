@@ -190,6 +190,8 @@ def test_numbers_are_those_that_figures_draw():
     for alpha, distances in published.DISTANCE.items():
         for u, value in distances.items():
             path = f"fig14_jamming_distance/jamming_distance[alpha={alpha:g}]/distance/{u:g}"
+            if u == 1e-15:  # that of all packings
+                path = f"fig05/phi_J[alpha={alpha:g}]{usual}/distance"
             assert rows[path].value == value
     for alpha, figure in ((1.0, "fig19a"), (4.0, "fig15a")):
         for band, part in published.BANDS[alpha].items():
@@ -217,6 +219,31 @@ def test_what_was_not_measured_here_is_taken_from_an_earlier_table(folder, repor
     with out.with_name("jobs.csv").open(newline="") as file:
         jobs = {row["job"]: row["seconds"] for row in csv.DictReader(file)}
     assert jobs == {"fig02": "3.0", "fig05": "2.5", "rods_alpha4": "60.0"}
+
+
+@pytest.mark.parametrize(
+    ("value", "verdict"), [(5.64, "agrees as the paper counted"), (5.75, "differs")]
+)
+def test_a_number_agrees_as_the_paper_counted_only_if_the_other_count_does(value, verdict):
+    script = runpy.run_path(str(ANALYSIS / SCRIPT))
+    published = script["Published"]
+    paper = [
+        published("z", "Fig. 8", 5.64, 0.01, "fig08/z", "", "", "z of strong bonds"),
+        published("z of strong bonds", "Fig. 8", 5.64, 0.01, "fig08/strong", "", ""),
+    ]
+    results = {"fig08": {"z": mean(5.97), "strong": mean(value)}}
+    first, second = script["rows_of"](results, paper, {})
+    assert (first.verdict, first.ours.value) == (verdict, 5.97)
+    assert second.verdict == ("agrees" if value == 5.64 else "differs")
+
+
+def test_the_other_count_must_be_a_row(tmp_path):
+    script = runpy.run_path(str(ANALYSIS / SCRIPT))
+    paper = tmp_path / "paper.csv"
+    header = "quantity,where,value,error,result,per,remark,counted"
+    paper.write_text(f"{header}\nz,Fig. 8,5.64,0.01,fig08/z,,,none\n")
+    with pytest.raises(ValueError, match="counted is 'none', expected the quantity of another row"):
+        script["read_paper"](paper)
 
 
 def test_a_fraction_of_nothing_is_not_measured():

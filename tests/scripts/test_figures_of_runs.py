@@ -10,14 +10,19 @@ import pytest
 from pictures import image
 from written import write_content
 
+import jamshape as js
 from jamshape.files.h5md import write_packing
 from jamshape.measures.jamming import Jamming
 from jamshape.measures.order import orientational_order
 from jamshape.packing import Box, Packing
 
 FOLDER = "marschall_2018"
-ORDER, PRESSURE, SLOW = (
-    f"{FOLDER}/{name}.py" for name in ("fig02_order", "fig04_pressure", "fig03_slow_compression")
+ORDER, PRESSURE, SLOW, LINES, QUASISTATIC = (
+    f"{FOLDER}/{name}.py"
+    for name in (
+        *("fig02_order", "fig04_pressure", "fig03_slow_compression"),
+        *("pressure_lines", "quasistatic_pressure"),
+    )
 )
 PHI_J = 0.866
 SHIFTS = {1: 0.001, 2: 0.002, 3: 0.003}
@@ -52,7 +57,7 @@ def compression(path, seed=1, shift=0.0, ends=(0.8, 0.9), slope=0.2, **attribute
     return path
 
 
-@pytest.mark.parametrize("script", [ORDER, PRESSURE, SLOW])
+@pytest.mark.parametrize("script", [ORDER, PRESSURE, SLOW, LINES, QUASISTATIC])
 def test_help(help_of, script):
     said = help_of(script)
     assert "Marschall & Teitel, PRE 97, 012905" in said
@@ -150,7 +155,7 @@ def rates(tmp_path_factory):
     """Three samples at two rates, of which the slower one begins later; in one file each."""
     folder = tmp_path_factory.mktemp("rates")
     onsets = {1: 0.0, 2: 0.002, 3: 0.01}
-    cost = {"flow_evaluations": 100, "flow_strain": 0.05, "flow_wall_seconds": 1.5}
+    cost = {"flow_evaluations": 100, "flow_wall_seconds": 1.5}
     paths = []
     for seed, onset in onsets.items():
         of = {"seed": seed, "ends": (0.84, 0.9)}
@@ -174,8 +179,18 @@ def test_rates_are_compared_sample_by_sample(report, rates, tmp_path):
     assert fast["excess"]["value"] > 0.1
     assert slow["shift"] is slow["excess"] is None
     assert (slow["evaluations"], slow["seconds"], fast["evaluations"]) == (100, 1.5, None)
-    assert slow["heun"] == pytest.approx(2 * 0.05 / (1e-10 * 0.01) / 100)
+    strain = np.log(0.9 / 0.84) / 2
+    assert slow["heun"] == pytest.approx(2 * strain / (1e-10 * 0.01) / 100)
     image(tmp_path / "slow.png")
+
+
+def test_steps_of_heun_are_counted_at_the_rates_that_held(report, tmp_path):
+    cost = {"flow_evaluations": 10, "flow_wall_seconds": 1.5}
+    kappa = np.array([[0.0, 1e-6], [0.85, 1e-8]])
+    one = compression(tmp_path / "run.h5", ends=(0.8, 0.9), kappa=kappa, **cost)
+    [row] = report(SLOW, one, "--out", tmp_path / "slow.png")["rows"]
+    time = np.log(0.85 / 0.8) / 2 / 1e-6 + np.log(0.9 / 0.85) / 2 / 1e-8
+    assert row["heun"] == pytest.approx(2 * time / 0.01 / 10)
 
 
 def test_one_sample_has_the_error_of_its_fit_and_packings_are_marked(here, capsys, rates, tmp_path):
@@ -210,3 +225,57 @@ def test_runs_without_a_bracket_tell_no_phi_j_by_frames(report, tmp_path):
     runs = [compression(tmp_path / "0.h5", 0, **one_end), compression(tmp_path / "1.h5", 1)]
     [row] = report(SLOW, *runs, "--out", tmp_path / "slow.png")["rows"]
     assert (row["phi_J(frames)"]["value"], row["phi_J(frames)"]["samples"]) == (None, 0)
+
+
+def test_zeros_of_lines_depend_on_their_pressures_only_where_the_curve_bends(report, tmp_path):
+    shifts = (-0.002, 0.0, 0.004)
+    runs = [compression(tmp_path / f"{k}.h5", k, shift=s) for k, s in enumerate(shifts)]
+    found = report(LINES, *runs, "--out", tmp_path / "lines.png")
+    assert found["packings"] == []
+    for row in found["zeros"]:
+        assert (row["alpha"], row["n"], row["kappa"]) == (4.0, 1024, 1e-6)
+        assert row["phi_J"]["value"] == pytest.approx(PHI_J + np.mean(shifts))
+        assert row["phi_J"]["error"] == pytest.approx(np.std(shifts, ddof=1) / np.sqrt(3))
+    image(tmp_path / "lines.png")
+
+
+def test_a_window_that_the_pressure_does_not_reach_has_no_line(report, problem, tmp_path):
+    run_file = compression(tmp_path / "run.h5")
+    asked = (LINES, run_file, "--out", tmp_path / "lines.png", "--windows")
+    low, high = report(*asked, "1e-3,4e-3", "1,2")["zeros"]
+    assert low["phi_J"]["value"] == pytest.approx(PHI_J)
+    assert (high["phi_J"]["value"], high["phi_J"]["samples"]) == (None, 0)
+    assert "--windows has '2,1', expected two pressures" in problem(*asked, "2,1")
+    assert "expected RUN.h5 or --quasistatic" in problem(LINES, "--out", tmp_path / "x.png")
+
+
+def test_a_packing_is_compressed_by_steps_and_opened_to_its_energy(report, problem, tmp_path):
+    particles = js.Spherocylinders(alpha=1)
+    for seed in (1, 2):
+        place = tmp_path / f"{seed}.h5"
+        js.make_packing(particles, n=24, u0=1e-10, seed=seed, progress=False, file=place)
+    packings = [tmp_path / "1.h5", tmp_path / "2.h5"]
+    first = [js.load(path).results["phi_J"] for path in packings]
+    end = max(first) + 0.02
+    asked = (QUASISTATIC, *packings, "--phi-end", end, "--out", tmp_path / "above")
+    found = report(*asked)
+    opened = [js.load(tmp_path / "above" / f"{seed}.h5") for seed in (1, 2)]
+    assert [one.results["u"] for one in opened] == pytest.approx([1e-10] * 2, rel=1e-6)
+    assert [row["phi_J"] for row in found["packings"]] == [one.results["phi_J"] for one in opened]
+    table = np.genfromtxt(tmp_path / "above" / "1.csv", delimiter=",", names=True)
+    assert (table["phi"][-1], table["u"][0]) == (pytest.approx(end), pytest.approx(1e-10))
+    steps = np.diff(table["phi"])
+    assert steps == pytest.approx(np.full(len(steps), steps[0]))
+    assert steps[0] <= 1e-3 * (1 + 1e-9)
+    # dU = -p dV between the last two rows, unless something rearranged.
+    volume = 1 / table["phi"][-2:]
+    work = -np.diff(table["u"][-2:] * volume)[0] / np.diff(volume)[0]
+    assert work == pytest.approx(table["pressure"][-2:].mean(), rel=0.02)
+    assert report(*asked) == found  # nothing is made again
+    lines = report(LINES, "--quasistatic", tmp_path / "above", "--out", tmp_path / "l.png")
+    [row] = lines["packings"]
+    assert row["first"]["value"] == pytest.approx(np.mean(first), abs=1e-9)
+    assert row["opened"]["value"] == pytest.approx(np.mean([o.results["phi_J"] for o in opened]))
+    assert {zero["kappa"] for zero in lines["zeros"]} == {0.0}
+    said = problem(QUASISTATIC, *packings, "--phi-end", 0.5, "--out", tmp_path / "above")
+    assert said.endswith("give a larger one")

@@ -16,6 +16,7 @@ FIGURES = {
     "marschall-2018": {
         "fig05": ("fig05_phi_j.py", ("rods", "published")),
         "fig08": ("fig08_contact_number.py", ("rods", "published")),
+        "pressure_lines": ("pressure_lines.py", ("--quasistatic", "above")),
     },
     "yuan-2019": {
         "fig03": ("fig03_phi_j.py", ("disordered",)),
@@ -39,10 +40,10 @@ def test_numbers_beside_the_paper_come_from_the_tables(paper, report, tmp_path):
     folder = paper.replace("-", "_")
     results = {}
     for name, (drawn, words) in FIGURES[paper].items():
-        tables = [path for word in words if (path := TABLES / paper / f"{word}.csv").exists()]
-        options = words[words.index("--quantity") :] if "--quantity" in words else ()
+        paths = {word: TABLES / paper / f"{word}.csv" for word in words}
+        asked = [path if path.exists() else word for word, path in paths.items()]
         out = tmp_path / f"{name}.png"
-        results[name] = report(f"{folder}/{drawn}", *tables, *options, "--out", out)
+        results[name] = report(f"{folder}/{drawn}", *asked, "--out", out)
     with (TABLES / paper / "agreement.csv").open(newline="", encoding="utf-8") as file:
         told = {row["quantity"]: row for row in csv.DictReader(file)}
     compared = 0

@@ -239,3 +239,17 @@ def test_curves_of_several_systems(report, problem, sweep, tmp_path):
     image(tmp_path / "a.png")
     said = problem(CLASSES, sweep, tmp_path, *out)
     assert "expected systems that differ in alpha only" in said
+
+
+def test_distance_from_jamming_is_that_of_the_root_of_the_energy(report, tmp_path):
+    # u = k (phi - phi_J)^2 / phi has the pressure phi du/dphi - u.
+    k, apart = 0.1, {1: 1e-7, 2: 3e-7}
+    for seed, distance in apart.items():
+        phi = 0.86 + distance
+        u = k * distance**2 / phi
+        pressure = 2 * k * distance - 2 * u
+        told = made_up(4, seed, phi=phi, u=u, pressure=pressure)
+        write_packing(tmp_path / f"{seed}.h5", squeezed(4, seed), told)
+    [row] = report(PHI_J, tmp_path, "--out", tmp_path / "a.png")["phi_J"]
+    assert row["distance"]["value"] == pytest.approx(2e-7, rel=1e-5)
+    assert row["distance"]["error"] == pytest.approx(1e-7, rel=1e-5)
