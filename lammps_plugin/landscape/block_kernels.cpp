@@ -160,7 +160,7 @@ inline int below(const BlockView &at, const LeftBlock &left)
   return at.first[left.column + 1] - left.block - 1;
 }
 
-/// How many blocks of a row, from k on, are of columns that have all further rows in common: with
+/// Number of blocks of a row, from k on, whose columns have all further rows in common: with
 /// all fill-in, each is then the parent of the one before in the elimination tree.
 template <int BLOCK> int columns_alike(const BlockView &at, int k, int last)
 {

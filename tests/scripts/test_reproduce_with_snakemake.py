@@ -142,7 +142,7 @@ def test_figures_that_are_chosen_come_with_what_they_need_and_with_no_more(tmp_p
     asked = ("marschall-2018", "--scale", "full", "--samples", "1", "--figures", "fig14b", "fig18b")
     alphas = ("0.01", "1", "4")  # those of the ladders, which both figures read
     packings = {f"rods_alpha{alpha}_seeds1to1" for alpha in alphas}
-    ladders = {f"ladder_alpha{alpha}" for alpha in alphas}
+    ladders = {f"ladder_alpha{alpha}_seed1" for alpha in alphas}
     assert listed_jobs(tmp_path, *asked) == packings | ladders | {"fig14b", "fig18b"}
 
 

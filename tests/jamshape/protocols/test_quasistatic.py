@@ -176,6 +176,7 @@ def test_minimisations_that_do_not_end_are_given_up_after_so_many_parts(monkeypa
 
 def test_before_a_search_long_minimisations_are_left_once_in_a_row(monkeypatch):
     monkeypatch.setattr(quasistatic, "_PART", 60)
+    monkeypatch.setattr(quasistatic, "_BRIEF", 60)
     rough = replace(ADAPTIVE, closeness=math.inf)
     landscape, compression, protocol = begun(n=24, phi=0.5, protocol=rough)
     left, loose = [], compression.loose

@@ -171,13 +171,15 @@ FORMED = {
 @pytest.mark.parametrize(
     ("name", "seed"),
     [
-        pytest.param(n, k, marks=[] if k == 2 else [pytest.mark.validate])
+        pytest.param(n, k, marks=[] if k == 3 else [pytest.mark.validate])
         for n in FORMED
-        for k in (2, 3, 4)
+        for k in (3, 4, 5)
     ],
 )
 def test_eigenvalues_of_clumps_and_polygons_lie_within_their_bounds(name, seed, measured):
-    """Polygons with one bond, turned by a little as above."""
+    """Polygons with one bond, turned by a little as above: in none of these seeds are two corners equally near
+    within 1e-8, which would share the bond.
+    """
     packing = js.make_packing(FORMED[name], n=12, seed=seed, u0=1e-13, progress=False)
     state = State.of(packing)
     turns = 1e-7 * np.random.default_rng(seed).normal(size=(packing.n, 1))
