@@ -369,11 +369,11 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     const Fill with = most == Fill::COMPLETE ? fill() : most;
     const Moved &posed = moved_to(at);
     std::unique_ptr<BlockSystem> &own = systems[with == Fill::COMPLETE];
-    if (!own || with == Fill::NONE) own = block_system(at, with);
+    if (!own || with == Fill::NONE) own = block_system(posed, at, with);
     hessian = own.get();
     find_axes(at);
     if (add_pairs(posed, at.strain)) return;
-    own = block_system(at, with);
+    own = block_system(posed, at, with);
     hessian = own.get();
     add_pairs(posed, at.strain);
   }
@@ -892,13 +892,17 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   /// The block system, with blocks of displacements alone if nothing can rotate. Pairs further
   /// apart than a small margin are left out, since they would multiply the fill-in; one without
   /// fill-in is made in no time, so that it leaves out all pairs that do not touch.
-  std::unique_ptr<BlockSystem> block_system(const Displacement &at, Fill with) const
+  std::unique_ptr<BlockSystem> block_system(const Moved &posed, const Displacement &at,
+                                            Fill with) const
   {
-    std::vector<char> used(pairs.list().n);
-    const Posed posed = posed_at<double>(pairs, at);
-    for (std::size_t p = 0; p < used.size(); ++p) {
-      used[p] = with == Fill::NONE ? posed.may_touch(p, posed.separation(p))
-                                   : posed.are_closer(p, CLOSE * skin);
+    std::vector<char> used(posed.size());
+    if (with == Fill::NONE) {
+      for (std::size_t p = 0; p < used.size(); ++p) {
+        used[p] = posed.may_touch(p, posed.separation(p));
+      }
+    } else {
+      const Posed own = posed_at<double>(pairs, at);
+      for (std::size_t p = 0; p < used.size(); ++p) used[p] = own.are_closer(p, CLOSE * skin);
     }
     const BlockPlan plan{coordinates.column, pairs.particles, used, shapes.size(), BLOCK, with};
     if (any_turns()) return std::make_unique<BlockSystemOf<BLOCK, D>>(plan);
