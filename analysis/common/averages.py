@@ -12,6 +12,9 @@ from numpy.typing import ArrayLike
 from jamshape.arrays import FloatArray
 from jamshape.measures.averages import Mean
 
+SURE = 2.0
+"""Joint errors from which a difference counts as one."""
+
 _Group = TypeVar("_Group")
 
 

@@ -13,15 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from common.averages import SURE
 from jamshape.arrays import FloatArray
 from jamshape.measures.averages import Mean
 from jamshape.measures.shears import ShearOf
 
 _FEWEST_RATES = 3  # of a curve
 _POWERS = (0.05, 1.2)  # range of b
-
-# A yield pressure is significant this many standard errors above zero.
-_SURE = 2.0
 
 
 class FlowCurve(NamedTuple):
@@ -45,7 +43,7 @@ class FlowCurve(NamedTuple):
     @property
     def has_yielded(self) -> bool:
         """Whether p_0 is significantly above zero."""
-        return self.yields > _SURE * self.yields_error
+        return self.yields > SURE * self.yields_error
 
     @property
     def viscosity(self) -> Mean:

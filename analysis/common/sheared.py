@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from common.averages import SURE
 from jamshape.arrays import FloatArray
 from jamshape.measures.averages import Mean
 from jamshape.measures.shears import ShearOf, read_shear
 
 ByAlpha = dict[float, list[ShearOf]]
-
-_SURE = 2.0  # joint errors
 
 
 def by_alpha(paths: Iterable[Path]) -> ByAlpha:
@@ -82,4 +81,4 @@ def _between(x: float, at: Sequence[float], values: Sequence[float]) -> float:
 
 def exceeds(one: Mean, other: Mean) -> bool:
     """Whether a mean is above another one by more than two joint errors."""
-    return bool(one.value - other.value > _SURE * np.hypot(one.error, other.error))
+    return bool(one.value - other.value > SURE * np.hypot(one.error, other.error))

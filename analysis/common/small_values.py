@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from common.averages import SURE
 from common.axes import figure_of
 from common.ensembles import conditions, read_groups
 from common.families import family
@@ -20,8 +21,6 @@ from jamshape.files.ensembles import PackingFile, System
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-_SURE = 2.0  # errors
 
 
 class Quantity(NamedTuple):
@@ -55,7 +54,7 @@ class Distribution(NamedTuple):
     @property
     def has_power(self) -> int:
         """1 if the power is above 0 by more than two errors."""
-        return int(self.power > _SURE * self.error)
+        return int(self.power > SURE * self.error)
 
 
 def exponent_of(values: FloatArray, below: float) -> tuple[float, float]:

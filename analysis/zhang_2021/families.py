@@ -23,6 +23,7 @@ from jamshape.command import parser_of, report, run
 from jamshape.drawing.saving import save_figure
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import SURE
 from common.axes import figure_of
 from common.stressed import (
     Series,
@@ -39,8 +40,6 @@ from common.styles import PAPER_LINE, color, marked
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-_SURE = 2.0  # joint errors
 
 
 class Means(NamedTuple):
@@ -135,7 +134,7 @@ def summary(of: Families, discs: Families) -> dict[str, Any]:
     told = {"alpha": of.alpha, "n": of.n, "samples": of.samples, "families": len(first)}
     told |= {"rising": int((first > 0).sum()), "falling": int((first < 0).sum())}
     told["has_both"] = int(min(told["rising"], told["falling"]) > 0)
-    told["G_f_above_discs"] = int(off > _SURE * np.hypot(of.G_f.error[-1], discs.G_f.error[-1]))
+    told["G_f_above_discs"] = int(off > SURE * np.hypot(of.G_f.error[-1], discs.G_f.error[-1]))
     return {**told, "points": points}
 
 

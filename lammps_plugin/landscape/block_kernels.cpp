@@ -212,6 +212,16 @@ template <int BLOCK, int COLUMNS> void take_columns(const BlockView &at, int j, 
   }
 }
 
+/// The same for n of them, up to COLUMNS.
+template <int BLOCK, int COLUMNS> void take_up_to(const BlockView &at, int j, int k, int n)
+{
+  if (n == COLUMNS) {
+    take_columns<BLOCK, COLUMNS>(at, j, k);
+  } else if constexpr (COLUMNS > 1) {
+    take_up_to<BLOCK, COLUMNS - 1>(at, j, k, n);
+  }
+}
+
 /// Subtracts from a column the contributions of the eliminated ones on its left (left-looking),
 /// except for blocks outside the pattern, and for blocks of zeros, which pairs that do not touch
 /// leave behind.
@@ -229,15 +239,7 @@ template <int BLOCK> void gather(const BlockView &at, int j)
       continue;
     }
     const int n = columns_alike<BLOCK>(at, k, last);
-    if (n == 4) {
-      take_columns<BLOCK, 4>(at, j, k);
-    } else if (n == 3) {
-      take_columns<BLOCK, 3>(at, j, k);
-    } else if (n == 2) {
-      take_columns<BLOCK, 2>(at, j, k);
-    } else {
-      take_columns<BLOCK, 1>(at, j, k);
-    }
+    take_up_to<BLOCK, MOST_COLUMNS>(at, j, k, n);
     k += n;
   }
 }
