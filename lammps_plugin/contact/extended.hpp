@@ -16,7 +16,7 @@ inline double rounded(long double x) { return static_cast<double>(x); }
 template <int N> Dual<N> rounded(const Dual<N, long double> &x)
 {
   Dual<N> y(static_cast<double>(x.value));
-  for (int k = 0; k < N; ++k) y.d[k] = static_cast<double>(x.d[k]);
+  for (int k = 0; k < N; ++k) y.set_derivative(k, static_cast<double>(x.derivative(k)));
   return y;
 }
 

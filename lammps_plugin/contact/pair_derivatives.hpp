@@ -47,8 +47,8 @@ template <int N, class S>
 QuaternionOf<Dual<N, S>> turned_by_variables(const QuaternionOf<S> &q, const Vec<1, int> &first)
 {
   QuaternionOf<Dual<N, S>> turned{q.w, q.i, q.j, q.k};
-  turned.w.d[first[0]] = -0.5 * q.k;
-  turned.k.d[first[0]] = 0.5 * q.w;
+  turned.w.set_derivative(first[0], -0.5 * q.k);
+  turned.k.set_derivative(first[0], 0.5 * q.w);
   return turned;
 }
 
@@ -137,9 +137,9 @@ void read_uncoupled(const Contact<D, Dual<PAIR_VARIABLES<D>, S>, BONDS> &dual,
     for (int k = 0; k < M; ++k) result.gradient[b][D + M + k] = value_of(bond.lever_j[k]);
   }
   for (int col = 0; col < N; ++col) {
-    for (int k = 0; k < D; ++k) result.curvature[k][col] = -dual.force[k].d[col];
-    for (int k = 0; k < M; ++k) result.curvature[D + k][col] = -dual.torque_i[k].d[col];
-    for (int k = 0; k < M; ++k) result.curvature[D + M + k][col] = -dual.torque_j[k].d[col];
+    for (int k = 0; k < D; ++k) result.curvature[k][col] = -dual.force[k].derivative(col);
+    for (int k = 0; k < M; ++k) result.curvature[D + k][col] = -dual.torque_i[k].derivative(col);
+    for (int k = 0; k < M; ++k) result.curvature[D + M + k][col] = -dual.torque_j[k].derivative(col);
   }
   // Rotations in space do not commute: the derivative of the torque with respect to a rotation
   // vector is that of the energy plus an antisymmetric part.

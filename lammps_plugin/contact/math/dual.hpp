@@ -6,13 +6,23 @@
 
 namespace jamshape {
 
+/// What derivatives of a scalar are kept in: doubles in pairs, as every processor computes with;
+/// compilers find few such pairs by themselves.
+template <class S> struct RegisterOf {
+  using Type = S;
+  static constexpr int LANES = 1;
+};
+template <> struct RegisterOf<double> {
+  using Type = double __attribute__((vector_size(16)));
+  static constexpr int LANES = 2;
+};
+
 /// A number with its derivatives with respect to N variables: forward-mode differentiation,
 /// accurate to rounding. Force code written for any scalar gives its exact derivative when run on
 /// these numbers, so that no second derivative is coded by hand. Branches depend on the values
 /// alone.
 template <int N, class S = double> struct Dual {
   S value;
-  S d[N];
 
   Dual() = default;
   Dual(S x) : value(x), d{} {}  // constants convert implicitly
@@ -21,33 +31,45 @@ template <int N, class S = double> struct Dual {
   static Dual variable(S x, int k)
   {
     Dual a(x);
-    a.d[k] = 1;
+    a.set_derivative(k, 1);
     return a;
+  }
+
+  /// The derivative with respect to the k-th variable.
+  S derivative(int k) const
+  {
+    if constexpr (LANES == 1) return d[k];
+    else return d[k / LANES][k % LANES];
+  }
+  void set_derivative(int k, S x)
+  {
+    if constexpr (LANES == 1) d[k] = x;
+    else d[k / LANES][k % LANES] = x;
   }
 
   /// The function value f(x), with derivatives f'(x) times those of x.
   [[gnu::always_inline]] Dual chain(S f, S slope) const
   {
     Dual a(f);
-    for (int k = 0; k < N; ++k) a.d[k] = slope * d[k];
+    for (int k = 0; k < REGISTERS; ++k) a.d[k] = slope * d[k];
     return a;
   }
 
   [[gnu::always_inline]] Dual &operator+=(const Dual &b)
   {
     value += b.value;
-    for (int k = 0; k < N; ++k) d[k] += b.d[k];
+    for (int k = 0; k < REGISTERS; ++k) d[k] += b.d[k];
     return *this;
   }
   [[gnu::always_inline]] Dual &operator-=(const Dual &b)
   {
     value -= b.value;
-    for (int k = 0; k < N; ++k) d[k] -= b.d[k];
+    for (int k = 0; k < REGISTERS; ++k) d[k] -= b.d[k];
     return *this;
   }
   [[gnu::always_inline]] Dual &operator*=(const Dual &b)
   {
-    for (int k = 0; k < N; ++k) d[k] = d[k] * b.value + value * b.d[k];
+    for (int k = 0; k < REGISTERS; ++k) d[k] = d[k] * b.value + value * b.d[k];
     value *= b.value;
     return *this;
   }
@@ -111,6 +133,10 @@ template <int N, class S = double> struct Dual {
   {
     return std::signbit(a.value) == std::signbit(b.value) ? a : -a;
   }
+
+ private:
+  static constexpr int LANES = RegisterOf<S>::LANES, REGISTERS = (N + LANES - 1) / LANES;
+  typename RegisterOf<S>::Type d[REGISTERS];
 };
 
 template <int N, class S> S value_of(const Dual<N, S> &x) { return x.value; }
