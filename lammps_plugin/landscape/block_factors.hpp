@@ -47,13 +47,18 @@ struct BlockPattern {
       const auto [low, high] = std::minmax(place[pairs[p]], place[pairs[p + 1]]);
       if (low < high) below[low].push_back(high);
     }
+    own_first.push_back(0);
+    for (std::vector<int> &rows : below) {
+      sort_once(rows);
+      own_row.insert(own_row.end(), rows.begin(), rows.end());
+      own_first.push_back(static_cast<int>(own_row.size()));
+    }
     // The rows of a column couple to each other once it is eliminated: handing the rest to the
     // first of them suffices, as it will hand them on (elimination tree: Liu, SIAM J. Matrix Anal.
     // Appl. 11, 134 (1990)).
     first.push_back(0);
     for (std::vector<int> &rows : below) {
-      std::sort(rows.begin(), rows.end());
-      rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+      sort_once(rows);
       row.insert(row.end(), rows.begin(), rows.end());
       first.push_back(static_cast<int>(row.size()));
       if (rows.empty() || fill == Fill::NONE) continue;
@@ -65,19 +70,22 @@ struct BlockPattern {
 
   std::size_t size() const { return place.size(); }
 
-  /// The number of the block below a diagonal one in a row.
+  /// The number of the matrix's block below a diagonal one in a row.
   int find(int below, int row_sought) const
   {
-    const auto begin = row.begin() + first[below], end = row.begin() + first[below + 1];
-    return static_cast<int>(std::lower_bound(begin, end, row_sought) - row.begin());
+    const auto begin = own_row.begin() + own_first[below];
+    const auto end = own_row.begin() + own_first[below + 1];
+    return static_cast<int>(std::lower_bound(begin, end, row_sought) - own_row.begin());
   }
 
   std::size_t n;                     // coordinates
   std::vector<std::int64_t> column;  // (N, block)
   Fill fill;
   std::vector<int> place;       // (N,) place of each particle in the order of elimination
-  std::vector<int> first;       // (N + 1,) first block below the diagonal, column by column
-  std::vector<int> row;         // row of each block, ascending within a column
+  std::vector<int> own_first;   // (N + 1,) first block of the matrix below the diagonal, by columns
+  std::vector<int> own_row;     // row of each of these, ascending within a column
+  std::vector<int> first;       // (N + 1,) the same of the factor,
+  std::vector<int> row;         // which has more where there is fill-in
   std::vector<int> first_left;  // (N + 1,) first of the same blocks, row by row
   std::vector<LeftBlock> left;  // ascending within a row
 
@@ -105,6 +113,12 @@ struct BlockPattern {
     return {order.indices().data(), order.indices().data() + N};
   }
 
+  static void sort_once(std::vector<int> &rows)
+  {
+    std::sort(rows.begin(), rows.end());
+    rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+  }
+
   void list_by_rows()
   {
     first_left.assign(size() + 1, 0);
@@ -120,24 +134,19 @@ struct BlockPattern {
 
 template <int BLOCK> using BlockOf = Eigen::Matrix<double, BLOCK, BLOCK>;
 
-/// A symmetric matrix: the blocks on its diagonal, and those below it, zero where only the factor
-/// has them.
+template <int BLOCK> const double *numbers_of(const std::vector<BlockOf<BLOCK>> &blocks)
+{
+  return blocks.empty() ? nullptr : blocks.data()->data();
+}
+
+/// A symmetric matrix: the blocks on its diagonal, and those below it, without fill-in.
 template <int BLOCK> struct BlockMatrix {
   std::vector<BlockOf<BLOCK>> diagonal, below;
 
-  /// View of its numbers; kernels that only read change nothing.
   BlockView view(const BlockPattern &of) const
   {
-    BlockView at{};
-    at.n = static_cast<int>(of.size());
-    at.is_complete = of.fill == Fill::COMPLETE;
-    at.first = of.first.data();
-    at.row = of.row.data();
-    at.first_left = of.first_left.data();
-    at.left = of.left.data();
-    at.diagonal = const_cast<double *>(diagonal.data()->data());
-    at.below = below.empty() ? nullptr : const_cast<double *>(below.data()->data());
-    return at;
+    return {static_cast<int>(of.size()), of.own_first.data(), of.own_row.data(),
+            numbers_of<BLOCK>(diagonal), numbers_of<BLOCK>(below)};
   }
 };
 
@@ -184,7 +193,8 @@ template <int BLOCK> class BlockRows {
 template <int BLOCK> class BlockFactors : public Factors {
  public:
   BlockFactors(std::shared_ptr<const BlockPattern> of, const BlockKernels &compiled) :
-      pattern(std::move(of)), kernels(compiled), inverse_pivots(BLOCK * pattern->size()),
+      pattern(std::move(of)), kernels(compiled), diagonal(pattern->size()),
+      below(pattern->row.size()), inverse_pivots(BLOCK * pattern->size()),
       block_of_row(pattern->size()), column_of_row(pattern->size())
   {
   }
@@ -194,15 +204,11 @@ template <int BLOCK> class BlockFactors : public Factors {
   /// of inertia), if the fill is complete.
   bool factorise(const BlockMatrix<BLOCK> &matrix, const BlockRows<BLOCK> &added)
   {
-    factors = matrix;
+    diagonal = matrix.diagonal;
     for (std::size_t j = 0; j < pattern->size(); ++j) {
-      for (int k = 0; k < BLOCK; ++k) factors.diagonal[j](k, k) += added.row(j)[k];
+      for (int k = 0; k < BLOCK; ++k) diagonal[j](k, k) += added.row(j)[k];
     }
-    BlockView at = factors.view(*pattern);
-    at.inverse_pivots = inverse_pivots.data();
-    at.block_of_row = block_of_row.data();
-    at.column_of_row = column_of_row.data();
-    return kernels.factorise(at);
+    return kernels.factorise(matrix.view(*pattern), view());
   }
 
   std::size_t size() const override { return pattern->n; }
@@ -210,18 +216,33 @@ template <int BLOCK> class BlockFactors : public Factors {
   Eigen::VectorXd solve(const Eigen::Ref<const Eigen::VectorXd> &right) const override
   {
     BlockRows<BLOCK> x(*pattern, right);
-    BlockView at = factors.view(*pattern);
-    at.inverse_pivots = const_cast<double *>(inverse_pivots.data());
-    kernels.solve(at, x.data());
+    kernels.solve(view(), x.data());
     return x.gathered();
   }
 
  private:
   std::shared_ptr<const BlockPattern> pattern;
   BlockKernels kernels;
-  BlockMatrix<BLOCK> factors;  // L below the pivots, which its diagonal holds
-  std::vector<double> inverse_pivots;
-  std::vector<int> block_of_row, column_of_row;  // work space
+  // L below the pivots, which its diagonal holds.
+  mutable std::vector<BlockOf<BLOCK>> diagonal, below;
+  mutable std::vector<double> inverse_pivots;
+  mutable std::vector<int> block_of_row, column_of_row;  // work space
+
+  /// Kernels that only read change nothing.
+  FactorView view() const
+  {
+    return {static_cast<int>(pattern->size()),
+            pattern->fill == Fill::COMPLETE,
+            pattern->first.data(),
+            pattern->row.data(),
+            pattern->first_left.data(),
+            pattern->left.data(),
+            diagonal.data()->data(),
+            below.empty() ? nullptr : below.data()->data(),
+            inverse_pivots.data(),
+            block_of_row.data(),
+            column_of_row.data()};
+  }
 };
 
 }  // namespace jamshape

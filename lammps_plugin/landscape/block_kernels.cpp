@@ -155,14 +155,14 @@ template <int BLOCK> bool is_zero(const double *block)
 constexpr int MOST_COLUMNS = 4;
 
 /// The number of blocks below another one in its column.
-inline int below(const BlockView &at, const LeftBlock &left)
+inline int below(const FactorView &at, const LeftBlock &left)
 {
   return at.first[left.column + 1] - left.block - 1;
 }
 
 /// Number of blocks of a row, from k on, whose columns have all further rows in common: with
 /// all fill-in, each is then the parent of the one before in the elimination tree.
-template <int BLOCK> int columns_alike(const BlockView &at, int k, int last)
+template <int BLOCK> int columns_alike(const FactorView &at, int k, int last)
 {
   constexpr int SIZE = BLOCK * BLOCK;
   int n = 1;
@@ -175,7 +175,7 @@ template <int BLOCK> int columns_alike(const BlockView &at, int k, int last)
   return n;
 }
 
-template <int BLOCK> Part<BLOCK> part_of(const BlockView &at, const LeftBlock &left)
+template <int BLOCK> Part<BLOCK> part_of(const FactorView &at, const LeftBlock &left)
 {
   constexpr int SIZE = BLOCK * BLOCK;
   Part<BLOCK> part;
@@ -189,7 +189,7 @@ template <int BLOCK> Part<BLOCK> part_of(const BlockView &at, const LeftBlock &l
 }
 
 /// Subtracts from column j the contributions of some columns with the same further rows.
-template <int BLOCK, int COLUMNS> void take_columns(const BlockView &at, int j, int k)
+template <int BLOCK, int COLUMNS> void take_columns(const FactorView &at, int j, int k)
 {
   constexpr int SIZE = BLOCK * BLOCK;
   const double *own[COLUMNS];
@@ -213,7 +213,7 @@ template <int BLOCK, int COLUMNS> void take_columns(const BlockView &at, int j, 
 }
 
 /// The same for n of them, up to COLUMNS.
-template <int BLOCK, int COLUMNS> void take_up_to(const BlockView &at, int j, int k, int n)
+template <int BLOCK, int COLUMNS> void take_up_to(const FactorView &at, int j, int k, int n)
 {
   if (n == COLUMNS) {
     take_columns<BLOCK, COLUMNS>(at, j, k);
@@ -222,16 +222,28 @@ template <int BLOCK, int COLUMNS> void take_up_to(const BlockView &at, int j, in
   }
 }
 
-/// Subtracts from a column the contributions of the eliminated ones on its left (left-looking),
-/// except for blocks outside the pattern, and for blocks of zeros, which pairs that do not touch
-/// leave behind.
-template <int BLOCK> void gather(const BlockView &at, int j)
+/// Sets the blocks below the diagonal to those of the matrix, and notes where they are.
+template <int BLOCK> void begin_column(const BlockView &matrix, const FactorView &at, int j)
 {
-  constexpr int SIZE = BLOCK * BLOCK;
+  constexpr std::size_t SIZE = BLOCK * BLOCK, BYTES = SIZE * sizeof(double);
   for (int b = at.first[j]; b < at.first[j + 1]; ++b) {
     at.block_of_row[at.row[b]] = b;
     at.column_of_row[at.row[b]] = j;
   }
+  const std::size_t n = at.first[j + 1] - at.first[j];
+  if (n > 0) std::memset(at.below + SIZE * at.first[j], 0, BYTES * n);
+  for (int b = matrix.first[j]; b < matrix.first[j + 1]; ++b) {
+    double *const to = at.below + SIZE * at.block_of_row[matrix.row[b]];
+    std::memcpy(to, matrix.below + SIZE * b, BYTES);
+  }
+}
+
+/// Subtracts from a column the contributions of the eliminated ones on its left (left-looking),
+/// except for blocks outside the pattern, and for blocks of zeros, which pairs that do not touch
+/// leave behind.
+template <int BLOCK> void gather(const FactorView &at, int j)
+{
+  constexpr int SIZE = BLOCK * BLOCK;
   const int last = at.first_left[j + 1];
   for (int k = at.first_left[j]; k < last;) {
     if (is_zero<BLOCK>(at.below + SIZE * at.left[k].block)) {
@@ -245,7 +257,7 @@ template <int BLOCK> void gather(const BlockView &at, int j)
 }
 
 /// Factorises the diagonal block into l d l^T, and divides those below it by d l^T.
-template <int BLOCK> bool eliminate(const BlockView &at, int j)
+template <int BLOCK> bool eliminate(const FactorView &at, int j)
 {
   constexpr int SIZE = BLOCK * BLOCK;
   double *const block = at.diagonal + SIZE * j, *const inverse = at.inverse_pivots + BLOCK * j;
@@ -270,17 +282,18 @@ template <int BLOCK> bool eliminate(const BlockView &at, int j)
   return true;
 }
 
-template <int BLOCK> bool factorise(const BlockView &at)
+template <int BLOCK> bool factorise(const BlockView &matrix, const FactorView &at)
 {
   for (int j = 0; j < at.n; ++j) at.column_of_row[j] = -1;
   for (int j = 0; j < at.n; ++j) {
+    begin_column<BLOCK>(matrix, at, j);
     gather<BLOCK>(at, j);
     if (!eliminate<BLOCK>(at, j)) return false;
   }
   return true;
 }
 
-template <int BLOCK> void substitute_forward(const BlockView &at, double *x)
+template <int BLOCK> void substitute_forward(const FactorView &at, double *x)
 {
   constexpr int SIZE = BLOCK * BLOCK, STRIDE = stride_of(BLOCK);
   for (int j = 0; j < at.n; ++j) {
@@ -300,7 +313,7 @@ template <int BLOCK> void substitute_forward(const BlockView &at, double *x)
   }
 }
 
-template <int BLOCK> void substitute_back(const BlockView &at, double *x)
+template <int BLOCK> void substitute_back(const FactorView &at, double *x)
 {
   constexpr int SIZE = BLOCK * BLOCK, STRIDE = stride_of(BLOCK);
   for (int j = at.n - 1; j >= 0; --j) {
@@ -321,7 +334,7 @@ template <int BLOCK> void substitute_back(const BlockView &at, double *x)
   }
 }
 
-template <int BLOCK> void solve(const BlockView &factors, double *x)
+template <int BLOCK> void solve(const FactorView &factors, double *x)
 {
   substitute_forward<BLOCK>(factors, x);
   substitute_back<BLOCK>(factors, x);

@@ -9,10 +9,16 @@ struct LeftBlock {
   int column, block;
 };
 
-/// A symmetric matrix of n rows of blocks, or its factors L D L^T: blocks on the diagonal, where
-/// factors have the pivots D, and below it, each BLOCK x BLOCK in columns. `BlockPattern` gives
-/// their places.
+/// A symmetric matrix of n rows of blocks on the diagonal and below it, each BLOCK x BLOCK in
+/// columns. `BlockPattern` gives their places.
 struct BlockView {
+  int n;
+  const int *first, *row;
+  const double *diagonal, *below;
+};
+
+/// Its factors L D L^T: the diagonal has the pivots D.
+struct FactorView {
   int n;
   bool is_complete;  // whether the pattern has all fill-in
   const int *first, *row, *first_left;
@@ -27,10 +33,11 @@ inline constexpr int stride_of(int block) { return block == 3 ? 4 : block; }
 /// The most expensive kernels of linear algebra, compiled for one instruction set. All sets round
 /// identically.
 struct BlockKernels {
-  /// Returns false if a pivot is not positive.
-  bool (*factorise)(const BlockView &matrix);
+  /// Sets the factors of a matrix whose diagonal they hold. Returns false if a pivot is not
+  /// positive.
+  bool (*factorise)(const BlockView &matrix, const FactorView &factors);
   /// Replaces x by the solution.
-  void (*solve)(const BlockView &factors, double *x);
+  void (*solve)(const FactorView &factors, double *x);
   /// Sets y, zero before, to the product with x.
   void (*multiply)(const BlockView &matrix, const double *x, double *y);
 };

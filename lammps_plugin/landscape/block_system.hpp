@@ -112,15 +112,13 @@ template <int BLOCK, int D> class BlockSystemOf : public BlockSystem {
       const int i = place(p, 0), j = place(p, 1);
       block.push_back(plan.used[p] ? pattern->find(std::min(i, j), std::max(i, j)) : -1);
     }
-    list_coupled();
   }
 
   /// Sets the matrix to zero, with 1 for each coordinate that a particle does not have.
   void clear() override
   {
     hessian.diagonal.assign(pattern->size(), Block::Zero());
-    hessian.below.assign(pattern->row.size(), Block::Zero());
-    coupled_below.clear();
+    hessian.below.assign(pattern->own_row.size(), Block::Zero());
     each([&](std::int64_t c, double &value) {
       if (c < 0) value = 1.0;
     });
@@ -166,16 +164,7 @@ template <int BLOCK, int D> class BlockSystemOf : public BlockSystem {
   Eigen::VectorXd times(const Eigen::Ref<const Eigen::VectorXd> &vector) const override
   {
     BlockRows<BLOCK> x(*pattern, vector), y(*pattern);
-    BlockView at = hessian.view(*pattern);
-    if (pattern->fill == Fill::COMPLETE) {  // its fill-in is zero
-      if (coupled_below.empty()) {
-        for (const int b : coupled) coupled_below.push_back(hessian.below[b]);
-      }
-      at.first = coupled_first.data();
-      at.row = coupled_row.data();
-      at.below = coupled_below.empty() ? nullptr : coupled_below.data()->data();
-    }
-    kernels.multiply(at, x.data(), y.data());
+    kernels.multiply(hessian.view(*pattern), x.data(), y.data());
     return y.gathered();
   }
 
@@ -217,28 +206,8 @@ template <int BLOCK, int D> class BlockSystemOf : public BlockSystem {
   std::shared_ptr<const BlockPattern> pattern;
   std::vector<int> block;  // (M,) block of each used pair below the diagonal
   BlockMatrix<BLOCK> hessian;
-  std::vector<int> coupled, coupled_first,
-      coupled_row;                           // blocks below the diagonal without fill-in
-  mutable std::vector<Block> coupled_below;  // gathered for products
   std::vector<std::shared_ptr<BlockFactors<BLOCK>>> made;
   BlockKernels kernels = block_kernels<BLOCK>();
-
-  void list_coupled()
-  {
-    std::vector<char> is_coupled(pattern->row.size());
-    for (std::size_t p = 0; p < block.size(); ++p) {
-      if (block[p] >= 0 && pairs[2 * p] != pairs[2 * p + 1]) is_coupled[block[p]] = 1;
-    }
-    coupled_first.push_back(0);
-    for (std::size_t j = 0; j < pattern->size(); ++j) {
-      for (int b = pattern->first[j]; b < pattern->first[j + 1]; ++b) {
-        if (!is_coupled[b]) continue;
-        coupled.push_back(b);
-        coupled_row.push_back(pattern->row[b]);
-      }
-      coupled_first.push_back(static_cast<int>(coupled.size()));
-    }
-  }
 
   /// Row of a pair's first or second particle.
   int place(std::size_t p, int side) const { return pattern->place[pairs[2 * p + side]]; }

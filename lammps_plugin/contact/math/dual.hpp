@@ -38,13 +38,17 @@ template <int N, class S = double> struct Dual {
   /// The derivative with respect to the k-th variable.
   S derivative(int k) const
   {
-    if constexpr (LANES == 1) return d[k];
-    else return d[k / LANES][k % LANES];
+    if constexpr (LANES == 1)
+      return d[k];
+    else
+      return d[k / LANES][k % LANES];
   }
   void set_derivative(int k, S x)
   {
-    if constexpr (LANES == 1) d[k] = x;
-    else d[k / LANES][k % LANES] = x;
+    if constexpr (LANES == 1)
+      d[k] = x;
+    else
+      d[k / LANES][k % LANES] = x;
   }
 
   /// The function value f(x), with derivatives f'(x) times those of x.
