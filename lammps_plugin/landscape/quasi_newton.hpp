@@ -57,7 +57,7 @@ class QuasiNewton {
   }
 
  private:
-  static constexpr std::size_t MEMORY = 12;
+  static constexpr std::size_t MEMORY = 20;
   static constexpr double LEAST = 1e-10;  // cosine: less is rounding
 
   struct Pair {
