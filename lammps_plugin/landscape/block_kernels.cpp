@@ -365,27 +365,36 @@ template <int BLOCK> void multiply(const BlockView &at, const double *x, double 
   }
 }
 
-using FourSingle = float __attribute__((vector_size(16)));
+/// Numbers added at once: 16 sums in any case, so that the rounding does not depend on the
+/// instruction set.
+#if defined(__AVX512F__)
+constexpr int AT_ONCE = 8;
+#else
+constexpr int AT_ONCE = 4;
+#endif
+constexpr int SUMS = 16;
+using Several = double __attribute__((vector_size(8 * AT_ONCE)));
+using SeveralSingle = float __attribute__((vector_size(4 * AT_ONCE)));
 
-Four in_doubles(const float *from)
+Several in_doubles(const float *from)
 {
-  FourSingle v;
+  SeveralSingle v;
   std::memcpy(&v, from, sizeof(v));
-  return __builtin_convertvector(v, Four);
+  return __builtin_convertvector(v, Several);
 }
 
 double add_and_dot(int n, double by, const float *vector, const float *further, double *x)
 {
-  constexpr int SUMS = 4;  // in turns, since each addition waits for the one before
-  Four sum[SUMS]{};
+  Several sum[SUMS / AT_ONCE]{};  // in turns, since each addition waits for the one before
   int k = 0;
-  for (; k + 4 * SUMS <= n; k += 4 * SUMS) {
-    for (int m = 0; m < SUMS; ++m) {
-      Four own;
-      std::memcpy(&own, x + k + 4 * m, sizeof(own));
-      own += by * in_doubles(vector + k + 4 * m);
-      std::memcpy(x + k + 4 * m, &own, sizeof(own));
-      sum[m] += own * in_doubles(further + k + 4 * m);
+  for (; k + SUMS <= n; k += SUMS) {
+    for (int m = 0; m < SUMS / AT_ONCE; ++m) {
+      const int at = k + AT_ONCE * m;
+      Several own;
+      std::memcpy(&own, x + at, sizeof(own));
+      own += by * in_doubles(vector + at);
+      std::memcpy(x + at, &own, sizeof(own));
+      sum[m] += own * in_doubles(further + at);
     }
   }
   double rest = 0.0;
@@ -393,7 +402,9 @@ double add_and_dot(int n, double by, const float *vector, const float *further, 
     x[k] += by * vector[k];
     rest += x[k] * further[k];
   }
-  const Four all = (sum[0] + sum[1]) + (sum[2] + sum[3]);
+  double each[SUMS], all[4];
+  std::memcpy(each, sum, sizeof(each));
+  for (int m = 0; m < 4; ++m) all[m] = (each[m] + each[m + 4]) + (each[m + 8] + each[m + 12]);
   return ((all[0] + all[1]) + (all[2] + all[3])) + rest;
 }
 

@@ -523,11 +523,10 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
 
   Quaternion orientation_at(const Displacement &at, std::size_t i) const
   {
-    const double *const now = &base.orientation[0][TURNS * i];
-    if constexpr (D == 2) {
-      const double half = 0.5 * (now[0] + (base.orientation[1][i] + turn(at, i)[0]));
-      return {std::cos(half), 0.0, 0.0, std::sin(half)};
+    if constexpr (D == 2) {  // since the list was made, mostly so little that a series suffices
+      return turned(moved->orientation_then(i), Vec<1>{{pairs.turned[i] + turn(at, i)[0]}});
     } else {
+      const double *const now = &base.orientation[0][TURNS * i];
       return turned(normalized(Quaternion{now[0], now[1], now[2], now[3]}), turn(at, i));
     }
   }
@@ -659,9 +658,12 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     list.moved.resize(D * shapes.size());
     list.turned.resize(TURNS * shapes.size());
     list.strain = strain_since(list);
+    const SplitPoses now = base.view(0.0), then = list.then.view(0.0);
+    double *const moved_by = list.moved.data();
     for (std::size_t c = 0; c < list.moved.size(); ++c) {
-      const Split change = since(base.position, list.then.position, c);
-      list.moved[c] = change.value + change.rest;
+      const Split change =
+          difference(::jamshape::at(now.position, c), ::jamshape::at(then.position, c));
+      moved_by[c] = change.value + change.rest;
     }
     const auto is_zero = [](double x) { return x == 0.0; };
     if (!std::all_of(list.strain.begin(), list.strain.end(), is_zero)) subtract_strain(list);
@@ -688,7 +690,8 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     const double *const now = &base.orientation[0][TURNS * i];
     const double *const then = &list.then.orientation[0][TURNS * i];
     if constexpr (D == 2) {
-      list.turned[i] = now[0] - then[0];
+      const Split change = since(base.orientation, list.then.orientation, i);
+      list.turned[i] = change.value + change.rest;
     } else {
       const Quaternion q = Quaternion{now[0], now[1], now[2], now[3]} *
                            Quaternion{then[0], -then[1], -then[2], -then[3]};
@@ -773,11 +776,10 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   {
     pairs = {{}, {}, {}, skin, reach + skin};
     const PosedPairs<Model, D, double> posed = posed_at<double>(wide, at);
-    for (std::size_t p = 0; p < posed.size(); ++p) {
-      if (!posed.are_closer(p, skin)) continue;
+    each_closer(posed, skin, [&](std::size_t p) {
       for (int k = 0; k < 2; ++k) pairs.particles.push_back(wide.particles[2 * p + k]);
       for (int k = 0; k < D; ++k) pairs.shift.push_back(wide.shift[D * p + k]);
-    }
+    });
     pairs.then = there;
     settle(pairs.then, at.strain);
     moved.emplace(shapes, pairs, laws, [this](std::size_t p) { return exactly(p); });
@@ -875,6 +877,10 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   {
     const long double stretch = 1.0L + strain;
     for (Poses::Numbers *lengths : {&poses.position, &poses.cell}) {
+      if (strain == 0.0) {
+        round_to_long(*lengths);
+        continue;
+      }
       for (std::size_t k = 0; k < (*lengths)[0].size(); ++k) {
         Poses::set(*lengths, k, split(stretch * joined(Poses::get(*lengths, k))));
       }
@@ -882,10 +888,23 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     if constexpr (D == 2) {  // full turns would cost digits
       constexpr long double TURN = 2.0L * 3.14159265358979323846264338327950288L;
       for (std::size_t i = 0; i < poses.orientation[0].size(); ++i) {
+        const double near = poses.orientation[0][i];
+        if (std::abs(near) <= static_cast<double>(0.5L * TURN)) continue;
+        const long double whole = std::rint(near / static_cast<double>(TURN));
         const long double angle = joined(Poses::get(poses.orientation, i));
-        const long double whole = std::rint(poses.orientation[0][i] / static_cast<double>(TURN));
         Poses::set(poses.orientation, i, split(angle - TURN * whole));
       }
+      round_to_long(poses.orientation);
+    }
+  }
+
+  static void round_to_long(Poses::Numbers &numbers)
+  {
+    double *const value = numbers[0].data(), *const rest = numbers[1].data();
+    for (std::size_t k = 0; k < numbers[0].size(); ++k) {
+      const Split rounded = rounded_to_long({value[k], rest[k]});
+      value[k] = rounded.value;
+      rest[k] = rounded.rest;
     }
   }
 

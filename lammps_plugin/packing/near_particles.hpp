@@ -31,12 +31,11 @@ ListedPairs near_particles(const std::vector<typename Model::Shape> &shapes,
   const PairList list{found.size(), found.particles.data(), found.shift.data()};
   const PosedPairs<Model, D, double> posed(shapes, poses, list, laws);
   std::size_t kept = 0;
-  for (std::size_t p = 0; p < list.n; ++p) {
-    if (!posed.are_closer(p, margin + ROUNDING * smallest)) continue;
+  each_closer(posed, margin + ROUNDING * smallest, [&](std::size_t p) {
     std::copy_n(&found.particles[2 * p], 2, &found.particles[2 * kept]);
     std::copy_n(&found.shift[D * p], D, &found.shift[D * kept]);
     ++kept;
-  }
+  });
   found.particles.resize(2 * kept);
   found.shift.resize(D * kept);
   return found;

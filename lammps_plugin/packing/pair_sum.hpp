@@ -193,9 +193,13 @@ template <class Model, int D, class S> class PosedPairs : public BodyPairs<Model
     return separation_of<D, T>(poses, this->pairs, p);
   }
 
-  bool may_touch(std::size_t p, const Vec<D, S> &r) const
+  bool may_touch(std::size_t p, const Vec<D, S> &r) const { return may_be_closer(p, r, 0.0); }
+
+  /// Whether the gap between the bounding spheres of a pair of this separation is smaller than a
+  /// margin.
+  bool may_be_closer(std::size_t p, const Vec<D, S> &r, double margin) const
   {
-    const double reach = this->around[first(p)] + this->around[second(p)];
+    const double reach = this->around[first(p)] + this->around[second(p)] + margin;
     return norm_sq(r) < S(reach) * reach;
   }
 
@@ -354,21 +358,33 @@ template <int D, class S> struct PairSums {
       return;
     }
     energy += contact.energy;
-    add_force(pairs.first(p), pairs.second(p), r, contact.force);
-    add_torques(pairs.first(p), pairs.second(p), contact.torque_i, contact.torque_j);
+    add_force(pairs.first(p), pairs.second(p), r, contact.force, virial);
+    if (!torque.empty()) {
+      add_torques(pairs.first(p), pairs.second(p), contact.torque_i, contact.torque_j);
+    }
     for (int b = 0; b < contact.n_bonds; ++b) bond_force += norm(contact.bond[b].force);
     n_bonds += contact.n_bonds;
   }
 
-  /// The k-th contact of a block, one that touches and is not alone.
-  void add(const ContactBlock<D> &block, int k)
+  /// The contacts of a block that touch and are not alone. Sums of all pairs stay in registers:
+  /// in memory each addition would wait for the one before.
+  void add(const ContactBlock<D> &block)
   {
-    const int i = block.i[k], j = block.j[k];
-    energy += block.energy[k];
-    add_force(i, j, block.separation_of(k), block.force_of(k));
-    if (!torque.empty()) add_torques(i, j, block.torque_i_of(k), block.torque_j_of(k));
-    bond_force += block.bond_force[k];
-    n_bonds += 1 + (block.two_bonds >> k & 1);
+    const std::uint64_t bits = block.touching & ~block.alone;
+    const bool any_turns = !torque.empty();
+    S energy_so_far = energy, bond_force_so_far = bond_force;
+    Vec<D * D, S> virial_so_far = virial;
+    block.for_each(bits, [&](int k) {
+      const int i = block.i[k], j = block.j[k];
+      energy_so_far += block.energy[k];
+      bond_force_so_far += block.bond_force[k];
+      add_force(i, j, block.separation_of(k), block.force_of(k), virial_so_far);
+      if (any_turns) add_torques(i, j, block.torque_i_of(k), block.torque_j_of(k));
+    });
+    energy = energy_so_far;
+    bond_force = bond_force_so_far;
+    virial = virial_so_far;
+    n_bonds += __builtin_popcountll(bits) + __builtin_popcountll(bits & block.two_bonds);
   }
 
   /// Adds the sums over the pairs that follow.
@@ -387,17 +403,17 @@ template <int D, class S> struct PairSums {
  private:
   void add_torques(std::size_t i, std::size_t j, const Torque<D, S> &on_i, const Torque<D, S> &on_j)
   {
-    if (torque.empty()) return;
     torque[i] += on_i;
     torque[j] += on_j;
   }
 
-  void add_force(std::size_t i, std::size_t j, const Vec<D, S> &r, const Vec<D, S> &on_i)
+  void add_force(std::size_t i, std::size_t j, const Vec<D, S> &r, const Vec<D, S> &on_i,
+                 Vec<D * D, S> &to_virial)
   {
     force[i] += on_i;
     force[j] -= on_i;
     for (int a = 0; a < D; ++a) {
-      for (int b = 0; b < D; ++b) virial[D * a + b] += r[a] * on_i[b];
+      for (int b = 0; b < D; ++b) to_virial[D * a + b] += r[a] * on_i[b];
     }
   }
 };
@@ -408,6 +424,38 @@ template <class Pairs> FindContacts<typename Pairs::Model, Pairs::D> *packs_for(
 {
   if (!pairs.any_law().shortcuts || !pairs.packs_take_all()) return nullptr;
   return PacksOf<typename Pairs::Model, Pairs::D>::of(required_instruction_set());
+}
+
+/// Calls `keep(p)` in order for the pairs whose surfaces may be closer than a margin.
+template <class Pairs, class Keep>
+void each_closer(const Pairs &posed, double margin, const Keep &keep)
+{
+  using Model = typename Pairs::Model;
+  constexpr int D = Pairs::D;
+  if constexpr (PacksOf<Model, D>::CHOOSE) {
+    if (auto *const find = packs_for(posed)) {
+      ContactBlock<D> block;
+      std::size_t number[ContactBlock<D>::MOST];
+      const auto choose = [&] {
+        if (block.n == 0) return;
+        block.margin = margin;
+        find(posed.bodies(), Model::law({1.0}, Sides::ONE), block);
+        block.for_each(block.touching, [&](int k) { keep(number[k]); });
+        block.n = 0;
+      };
+      for (std::size_t p = 0; p < posed.size(); ++p) {
+        const Vec<D> r = posed.separation(p);
+        number[block.n] = p;
+        block.put(static_cast<int>(posed.first(p)), static_cast<int>(posed.second(p)), r, 1.0);
+        block.n += posed.may_be_closer(p, r, margin);
+        if (block.n == block.MOST) choose();
+      }
+      return choose();
+    }
+  }
+  for (std::size_t p = 0; p < posed.size(); ++p) {
+    if (posed.are_closer(p, margin)) keep(p);
+  }
 }
 
 /// Pairs of a list that may touch, in a block, with the number of each.
@@ -443,7 +491,7 @@ template <class Pairs> class NumberedBlock {
   void add_to(PairSums<D, double> &sums, FindContacts<Model, D> &find)
   {
     find(pairs.bodies(), pairs.any_law(), block);
-    block.for_each(block.touching & ~block.alone, [&](int k) { sums.add(block, k); });
+    sums.add(block);
     if constexpr (HAS_START) {
       for (int k = 0; starts != nullptr && k < block.n; ++k) starts[number[k]] = block.start_of(k);
     }

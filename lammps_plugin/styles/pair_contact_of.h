@@ -316,12 +316,13 @@ template <class Model> class PairContactOf : public PairContact {
 
   template <int D, bool TURNS, bool TALLY> void add_contact(int i, int j, const Load<D> &load)
   {
-    double **const f = atom->f, **const torque = atom->torque;
-    add_to<D>(f[i], load.force);
-    if constexpr (TURNS) add_torque<D>(torque[i], load.torque_i);
+    // Rows of LAMMPS's arrays follow one another: their addresses need not be loaded.
+    double *const f = atom->f[0], *const torque = atom->torque[0];
+    add_to<D>(f + 3 * std::size_t(i), load.force);
+    if constexpr (TURNS) add_torque<D>(torque + 3 * std::size_t(i), load.torque_i);
     if (force->newton_pair || j < atom->nlocal) {
-      add_to<D>(f[j], -load.force);
-      if constexpr (TURNS) add_torque<D>(torque[j], load.torque_j);
+      add_to<D>(f + 3 * std::size_t(j), -load.force);
+      if constexpr (TURNS) add_torque<D>(torque + 3 * std::size_t(j), load.torque_j);
     }
     if constexpr (TALLY) tally<D>(i, j, load);
   }
