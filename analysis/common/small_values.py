@@ -22,6 +22,9 @@ from jamshape.files.ensembles import PackingFile, System
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+Estimate = Callable[[FloatArray, float], tuple[float, float]]
+"""Exponent of values below a bound, and its error."""
+
 
 class Quantity(NamedTuple):
     """A quantity whose small values x have the density x^(sign power)."""
@@ -75,9 +78,27 @@ def exponent_of(values: FloatArray, below: float) -> tuple[float, float]:
     return slope - 1, slope / len(small) ** 0.5
 
 
-def power_of(of: Quantity, values: FloatArray, below: float) -> tuple[float, float]:
+def extrapolated(values: FloatArray, below: float) -> tuple[float, float]:
+    """Extrapolate the exponent linearly to a bound of 0, from that bound and half of it; return it and its error.
+
+    A density x^exponent (1 + c x + ...) has an estimate that is off in proportion to the bound. The values below half of the
+    bound are part of those below it, so that the covariance of both estimates is the variance of the second.
+
+    Examples
+    --------
+    >>> sample = 0.2 * (np.sqrt(1 + 8 * np.linspace(0, 1, 100001)[1:]) - 1) / 2  # density (1 + 10 x) / 0.4
+    >>> round(exponent_of(sample, 0.02)[0], 2), abs(extrapolated(sample, 0.02)[0]) < 0.01
+    (0.05, True)
+    """
+    (whole, error), (half, error_half) = exponent_of(values, below), exponent_of(values, below / 2)
+    return 2 * half - whole, max(4 * error_half**2 - 3 * error**2, 0.0) ** 0.5
+
+
+def power_of(
+    of: Quantity, values: FloatArray, below: float, estimate: Estimate = exponent_of
+) -> tuple[float, float]:
     """Estimate the power of a quantity and its error."""
-    exponent, error = exponent_of(values, below)
+    exponent, error = estimate(values, below)
     return of.sign * exponent, error
 
 
@@ -125,7 +146,10 @@ def study(options: Namespace, of: Quantity, values_of: Callable[[PackingFile], F
     rows = [
         {"family": family(one.system), "Delta": round(one.Delta, 9), "count": len(one.values)}
         | {of.power: one.power, f"{of.power}_error": one.error, "has_power": one.has_power}
-        | {"by_bound": [(below, *power_of(of, one.values, below)) for below in of.bounds]}
+        | {
+            name: [(below, *power_of(of, one.values, below, estimate)) for below in of.bounds]
+            for name, estimate in (("by_bound", exponent_of), ("extrapolated", extrapolated))
+        }
         for one in found
     ]
     report({"out": options.out, "conditions": conditions(groups), of.name: rows})

@@ -8,7 +8,7 @@ import pytest
 from pictures import image
 
 import jamshape as js
-from common.small_values import exponent_of
+from common.small_values import exponent_of, extrapolated
 from jamshape.files.ensembles import PackingFile
 
 FOLDER = "brito_2018"
@@ -96,6 +96,20 @@ def test_exponents_of_small_values_are_found(theta):
     found, error = exponent_of(0.2 * uniform ** (1 / (1 + theta)), 0.2)
     assert found == pytest.approx(theta, abs=1e-3)
     assert error == pytest.approx((1 + theta) / 20000**0.5, rel=1e-2)
+
+
+@pytest.mark.parametrize("theta", [-0.3, 0.0, 0.175])
+def test_exponents_are_extrapolated_to_a_bound_of_zero(theta):
+    rng = np.random.default_rng(1)
+    found = []
+    for _ in range(200):
+        x = rng.random(20000) ** (1 / (1 + theta))
+        kept = x[rng.random(20000) < (1 + x) / 2]  # of the density x^theta (1 + x)
+        found.append((*extrapolated(kept, 0.5), exponent_of(kept, 0.5)[0]))
+    exponents, errors, below = np.array(found).T
+    assert below.mean() > theta + 0.07
+    assert exponents.mean() == pytest.approx(theta, abs=0.03)
+    assert errors.mean() == pytest.approx(exponents.std(), rel=0.15)
 
 
 def test_powers_of_contacts_are_found(monkeypatch):
