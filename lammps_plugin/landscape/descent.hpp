@@ -99,8 +99,9 @@ class Descent {
   using Tell = std::function<void(const DescentRow &)>;
 
   Descent(LocalEnergyModel &landscape, const DescentStop &when, double first_shift) :
-      about(landscape), stop(when), system(landscape, first_shift), by_newton(when.is_near),
-      is_near(when.is_near), newton_below(when.newton_below)
+      about(landscape), stop(when), system(landscape, first_shift),
+      memory(landscape.dimension() == 2 ? REMEMBERED_IN_2D : REMEMBERED_IN_3D),
+      by_newton(when.is_near), is_near(when.is_near), newton_below(when.newton_below)
   {
   }
 
@@ -165,6 +166,9 @@ class Descent {
   static constexpr double SOFT = 0.1;
   /// Factor of this shift if a pivot is not positive.
   static constexpr double STIFFEN = 3.0;
+  /// Steps that L-BFGS remembers: fewer in 2D, where an evaluation costs no more than their
+  /// vectors; in 3D a short memory takes more evaluations.
+  static constexpr std::size_t REMEMBERED_IN_2D = 12, REMEMBERED_IN_3D = 20;
   /// Steps of L-BFGS after which the factors are recomputed.
   static constexpr int REFRESH = 60;
 

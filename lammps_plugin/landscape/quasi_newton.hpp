@@ -17,6 +17,9 @@ class QuasiNewton {
  public:
   using Vector = Eigen::VectorXd;
 
+  /// Directions that remember this many steps.
+  explicit QuasiNewton(std::size_t most_steps) : most(most_steps) {}
+
   bool is_empty() const { return pairs.empty(); }
 
   /// Adds a step and the change of the gradient along it, both over the length of the step.
@@ -25,7 +28,7 @@ class QuasiNewton {
     const double curvature = step.dot(change), length = step.norm();
     if (!(curvature > LEAST * length * change.norm())) return;
     Pair added;
-    if (pairs.size() == MEMORY) {  // its arrays are used again
+    if (pairs.size() == most) {  // its arrays are used again
       added = std::move(pairs.front());
       pairs.pop_front();
     }
@@ -57,13 +60,13 @@ class QuasiNewton {
   }
 
  private:
-  static constexpr std::size_t MEMORY = 20;
   static constexpr double LEAST = 1e-10;  // cosine: less is rounding
 
   struct Pair {
     Eigen::VectorXf step, change;
     double inverse;
   };
+  std::size_t most;
   std::deque<Pair> pairs;
   AddAndDot add_and_dot_product = add_and_dot();
 
