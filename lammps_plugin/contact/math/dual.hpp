@@ -6,7 +6,7 @@
 
 namespace jamshape {
 
-/// What derivatives of a scalar are kept in: doubles in pairs, as every processor computes with;
+/// Storage of the derivatives of a scalar: doubles in pairs, as every processor computes with;
 /// compilers find few such pairs by themselves.
 template <class S> struct RegisterOf {
   using Type = S;
