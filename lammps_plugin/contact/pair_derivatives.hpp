@@ -139,7 +139,8 @@ void read_uncoupled(const Contact<D, Dual<PAIR_VARIABLES<D>, S>, BONDS> &dual,
   for (int col = 0; col < N; ++col) {
     for (int k = 0; k < D; ++k) result.curvature[k][col] = -dual.force[k].derivative(col);
     for (int k = 0; k < M; ++k) result.curvature[D + k][col] = -dual.torque_i[k].derivative(col);
-    for (int k = 0; k < M; ++k) result.curvature[D + M + k][col] = -dual.torque_j[k].derivative(col);
+    for (int k = 0; k < M; ++k)
+      result.curvature[D + M + k][col] = -dual.torque_j[k].derivative(col);
   }
   // Rotations in space do not commute: the derivative of the torque with respect to a rotation
   // vector is that of the energy plus an antisymmetric part.
