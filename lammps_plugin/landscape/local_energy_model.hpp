@@ -523,10 +523,11 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
 
   Quaternion orientation_at(const Displacement &at, std::size_t i) const
   {
-    if constexpr (D == 2) {  // since the list was made, mostly so little that a series suffices
-      return turned(moved->orientation_then(i), Vec<1>{{pairs.turned[i] + turn(at, i)[0]}});
+    const double *const now = &base.orientation[0][TURNS * i];
+    if constexpr (D == 2) {
+      const double half = 0.5 * (now[0] + (base.orientation[1][i] + turn(at, i)[0]));
+      return {std::cos(half), 0.0, 0.0, std::sin(half)};
     } else {
-      const double *const now = &base.orientation[0][TURNS * i];
       return turned(normalized(Quaternion{now[0], now[1], now[2], now[3]}), turn(at, i));
     }
   }
@@ -690,8 +691,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     const double *const now = &base.orientation[0][TURNS * i];
     const double *const then = &list.then.orientation[0][TURNS * i];
     if constexpr (D == 2) {
-      const Split change = since(base.orientation, list.then.orientation, i);
-      list.turned[i] = change.value + change.rest;
+      list.turned[i] = now[0] - then[0];
     } else {
       const Quaternion q = Quaternion{now[0], now[1], now[2], now[3]} *
                            Quaternion{then[0], -then[1], -then[2], -then[3]};

@@ -67,14 +67,9 @@ template <class Model, int D> class MovedPairs : public BodyPairs<Model, D, doub
              std::function<InLong(std::size_t)> exact_pair) :
       Base(particle_shapes, list.list(), contact_laws), exact(std::move(exact_pair)),
       shift(particle_shapes.size()),
-      orientation(particle_shapes.size(), Quaternion{1.0, 0.0, 0.0, 0.0}),
-      then_orientation(orientation)
+      orientation(particle_shapes.size(), Quaternion{1.0, 0.0, 0.0, 0.0})
   {
     const SplitPoses then = list.then.view(0.0);
-    for (std::size_t n = 0; D == 2 && n < particle_shapes.size(); ++n) {
-      if (this->turns(n))
-        then_orientation[n] = rotation_by(Vec<1>{{at(then.orientation, n).value}});
-    }
     for (std::size_t p = 0; p < this->size(); ++p) {
       const double reach = this->around[first(p)] + this->around[second(p)];
       reach_sq.push_back(reach * reach);
@@ -105,8 +100,6 @@ template <class Model, int D> class MovedPairs : public BodyPairs<Model, D, doub
 
   /// Displaces a particle, apart from the box's strain.
   void displace(std::size_t n, const Vec<D> &by) { shift[n] = by; }
-  /// In 2D the orientation when the list was made, apart from the low part of its angle.
-  const Quaternion &orientation_then(std::size_t n) const { return then_orientation[n]; }
   void turn(std::size_t n, const Quaternion &to)
   {
     orientation[n] = to;
@@ -139,7 +132,7 @@ template <class Model, int D> class MovedPairs : public BodyPairs<Model, D, doub
   std::vector<double> strained_by;
   std::vector<double> reach_sq;  // squared distances at which bounding spheres touch
   std::vector<Vec<D>> shift;
-  std::vector<Quaternion> orientation, then_orientation;
+  std::vector<Quaternion> orientation;
 };
 
 }  // namespace jamshape
