@@ -22,19 +22,20 @@ from jamshape.minima import History, Minimum, Outcome, residual_of
 from jamshape.minima.target import Target, find
 from jamshape.packing import Box, Packing
 
-# n, alpha, the packing fraction just below jamming where the search begins, u0
+# n, alpha, the packing fraction just below jamming where the search begins, seed, u0
 FOUND = {
-    "20 rods of alpha 0.01": (20, 0.01, 0.80, 1e-15),
-    "24 rods of alpha 1": (24, 1, 0.85, 1e-15),
-    "24 rods of alpha 4": (24, 4, 0.80, 1e-15),
-    "24 rods of alpha 4, well above jamming": (24, 4, 0.80, 1e-9),
+    "20 rods of alpha 0.01": (20, 0.01, 0.80, 1, 1e-15),
+    # of seed 1 two rods slide, at a cost of second order, which rounding hides
+    "24 rods of alpha 1": (24, 1, 0.85, 2, 1e-15),
+    "24 rods of alpha 4": (24, 4, 0.80, 1, 1e-15),
+    "24 rods of alpha 4, well above jamming": (24, 4, 0.80, 1, 1e-9),
 }
 
 
 @cache
 def found(name):
-    n, alpha, phi, u0 = FOUND[name]
-    packing, state = squeezed(n, alpha, phi)
+    n, alpha, phi, seed, u0 = FOUND[name]
+    packing, state = squeezed(n, alpha, phi, seed)
     landscape = Landscape(packing)
     return landscape, find(landscape, state, Target(u0))
 
