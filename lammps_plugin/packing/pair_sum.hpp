@@ -426,39 +426,7 @@ template <class Pairs> FindContacts<typename Pairs::Model, Pairs::D> *packs_for(
   return PacksOf<typename Pairs::Model, Pairs::D>::of(required_instruction_set());
 }
 
-/// Calls `keep(p)` in order for the pairs whose surfaces may be closer than a margin.
-template <class Pairs, class Keep>
-void each_closer(const Pairs &posed, double margin, const Keep &keep)
-{
-  using Model = typename Pairs::Model;
-  constexpr int D = Pairs::D;
-  if constexpr (PacksOf<Model, D>::CHOOSE) {
-    if (auto *const find = packs_for(posed)) {
-      ContactBlock<D> block;
-      std::size_t number[ContactBlock<D>::MOST];
-      const auto choose = [&] {
-        if (block.n == 0) return;
-        block.margin = margin;
-        find(posed.bodies(), Model::law({1.0}, Sides::ONE), block);
-        block.for_each(block.touching, [&](int k) { keep(number[k]); });
-        block.n = 0;
-      };
-      for (std::size_t p = 0; p < posed.size(); ++p) {
-        const Vec<D> r = posed.separation(p);
-        number[block.n] = p;
-        block.put(static_cast<int>(posed.first(p)), static_cast<int>(posed.second(p)), r, 1.0);
-        block.n += posed.may_be_closer(p, r, margin);
-        if (block.n == block.MOST) choose();
-      }
-      return choose();
-    }
-  }
-  for (std::size_t p = 0; p < posed.size(); ++p) {
-    if (posed.are_closer(p, margin)) keep(p);
-  }
-}
-
-/// Pairs of a list that may touch, in a block, with the number of each.
+/// Near pairs of a list, in a block, with the number of each.
 template <class Pairs> class NumberedBlock {
  public:
   using Model = typename Pairs::Model;
@@ -471,8 +439,9 @@ template <class Pairs> class NumberedBlock {
 
   bool is_empty() const { return block.n == 0; }
 
-  /// Takes as many as fit from the first on; returns where to resume.
-  std::size_t fill(const Range &from)
+  /// Takes as many pairs as fit from the first on, of those for which `is_near(p, r)`; returns
+  /// where to resume.
+  template <class IsNear> std::size_t fill(const Range &from, const IsNear &is_near)
   {
     std::size_t p = from.first;
     for (block.n = 0; p < from.last && block.n < block.MOST; ++p) {
@@ -483,9 +452,18 @@ template <class Pairs> class NumberedBlock {
       number[block.n] = p;
       block.put(static_cast<int>(pairs.first(p)), static_cast<int>(pairs.second(p)), r,
                 pairs.law(p).bond.k_e);
-      block.n += pairs.may_touch(p, r);  // a branch would be unpredictable
+      block.n += is_near(p, r);  // a branch would be unpredictable
     }
     return p;
+  }
+
+  /// Calls `keep(p)` in order for those whose surfaces may be closer than a margin.
+  template <class Keep>
+  void each_closer(double margin, FindContacts<Model, D> &find, const Keep &keep)
+  {
+    block.margin = margin;
+    find(pairs.bodies(), Model::law({1.0}, Sides::ONE), block);
+    block.for_each(block.touching, [&](int k) { keep(number[k]); });
   }
 
   void add_to(PairSums<D, double> &sums, FindContacts<Model, D> &find)
@@ -509,6 +487,26 @@ template <class Pairs> class NumberedBlock {
   std::size_t number[ContactBlock<D>::MOST];
 };
 
+/// Calls `keep(p)` in order for the pairs whose surfaces may be closer than a margin.
+template <class Pairs, class Keep>
+void each_closer(const Pairs &posed, double margin, const Keep &keep)
+{
+  if constexpr (PacksOf<typename Pairs::Model, Pairs::D>::CHOOSE) {
+    if (auto *const find = packs_for(posed)) {
+      NumberedBlock<Pairs> block(posed, nullptr);
+      const auto is_near = [&](auto p, const auto &r) { return posed.may_be_closer(p, r, margin); };
+      for (std::size_t p = 0; p < posed.size();) {
+        p = block.fill({p, posed.size()}, is_near);
+        if (!block.is_empty()) block.each_closer(margin, *find, keep);
+      }
+      return;
+    }
+  }
+  for (std::size_t p = 0; p < posed.size(); ++p) {
+    if (posed.are_closer(p, margin)) keep(p);
+  }
+}
+
 /// Sums over a range of pairs. Contacts start from the previous ones of these pairs, if given.
 template <class Pairs>
 void sum_part(PairSums<Pairs::D, typename Pairs::S> &sums, const Pairs &pairs,
@@ -522,7 +520,8 @@ void sum_part(PairSums<Pairs::D, typename Pairs::S> &sums, const Pairs &pairs,
     if (auto *const find = packs_for(pairs)) {
       NumberedBlock<Pairs> block(pairs, starts);
       for (std::size_t p = part.first; p < part.last;) {
-        p = block.fill({p, part.last});
+        p = block.fill({p, part.last},
+                       [&](auto q, const auto &r) { return pairs.may_touch(q, r); });
         if (!block.is_empty()) block.add_to(sums, *find);
       }
       return;
