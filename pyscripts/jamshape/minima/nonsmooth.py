@@ -42,8 +42,8 @@ _FARTHER = 4.0
 # Two gradients belong to one side if they differ by no more than this fraction of the difference to others.
 _SAME_SIDE = 1e-2
 
-# A model on a ray is on the side of another one if their gradients differ by no more than this fraction of the difference
-# to any third: gradients of one side change by a few per cent along the ray.
+# Where several kinks meet, a model on a ray is on the side of another one if their gradients differ by less than this
+# fraction of the difference to any third.
 _OWN_SIDE = 0.25
 
 # The Hessian is updated after a step of more than this fraction of the overlap.
@@ -163,19 +163,22 @@ class Corner:
         weights = weights_of(products, self.below())
         return weights, weights @ gradients, -(weights @ steps)
 
-    def draw_near(self, weights: FloatArray, tip: FloatArray) -> None:
-        """Move models with nonzero weight closer to the kink, on their side of it.
+    def draw_near(self, tip: FloatArray) -> None:
+        """Move models closer to the kink, on their side of it.
 
-        Where several kinks meet, the sides are cones. A ray from their tip, here the minimum of the largest model, stays
-        on a side. The difference of two gradients may point to a third, and serves only if that minimum is not near the tip.
+        The difference of two gradients is the normal of a single kink. Where several meet, it may point to a third side;
+        the sides are cones then, and a ray from their tip, here the minimum of the largest model, stays on one. The normal
+        serves if that minimum is not near the tip.
         """
         first, gradients = self.pieces[0], self.gradients()
+        is_single = len(self.pieces) == 2
         for k in range(1, len(self.pieces)):
             x, jump = self.pieces[k].x, gradients[k] - gradients[0]
             far = float(np.abs(x - first.x).max())
-            if weights[k] == 0 or far <= self.near:
+            if far <= self.near:
                 continue
-            for origin, way in ((tip, x - tip), (first.x, jump)):
+            normal, ray = (first.x, jump), (tip, x - tip)
+            for origin, way in (normal,) if is_single else (ray, normal):
                 closer = self._closest(k, gradients, origin, way, far) if way.any() else None
                 if closer is not None:
                     self.pieces[k] = closer
@@ -185,12 +188,13 @@ class Corner:
         self, k: int, gradients: FloatArray, origin: FloatArray, way: FloatArray, far: float
     ) -> Piece | None:
         """Return the model closest to the origin of a ray on the side of model k; None without one nearer than `far`."""
+        own_side = 1.0 if len(gradients) == 2 else _OWN_SIDE
         unit, distance = way / np.abs(way).max(), self.near
         while distance < far:
             there = self._piece(origin + distance * unit)
             gradient = there.evaluation.gradient + self.times(self.pieces[0].x - there.x)
             others = np.linalg.norm(gradients - gradient, axis=1)
-            if others[k] <= _OWN_SIDE * np.delete(others, k).min():
+            if others[k] < own_side * np.delete(others, k).min():
                 return there
             distance *= _FARTHER
         return None
@@ -299,8 +303,8 @@ def at_rest(landscape: Landscape, state: State, tolerance: float) -> Rest | None
                 least, last_gain = residual, k
             if k - last_gain > _PATIENCE:
                 return None
-            corner.draw_near(weights, first.x + step)
             corner.forget(weights)
+            corner.draw_near(first.x + step)
             corner.add(first.x + step)
             corner.renew()
     except (CrossingError, RuntimeError):
