@@ -30,8 +30,8 @@ _STEPS = 100
 # No kink is found if the residual has not halved in this number of steps, as where rods slide.
 _PATIENCE = 15
 
-# Size of the bundle: one more than kinks that meet.
-_MOST = 7
+# Size of the bundle, more than kinks that meet: seven were seen in packings of 1024 nearly round rods.
+_MOST = 10
 
 # Points of the bundle are so close that the error of the quadratic models is below this fraction of the tolerance.
 _NEAR = 0.3
@@ -41,6 +41,10 @@ _FARTHER = 4.0
 
 # Two gradients belong to one side if they differ by no more than this fraction of the difference to others.
 _SAME_SIDE = 1e-2
+
+# Where several kinks meet, a model on a ray is on the side of another one if their gradients differ by less than this
+# fraction of the difference to any third.
+_OWN_SIDE = 0.25
 
 # The Hessian is updated after a step of more than this fraction of the overlap.
 _RENEW = 1e-2
@@ -159,23 +163,41 @@ class Corner:
         weights = weights_of(products, self.below())
         return weights, weights @ gradients, -(weights @ steps)
 
-    def draw_near(self, weights: FloatArray) -> None:
-        """Move models with nonzero weight to points closer to the lowest one, on their side of the kink."""
+    def draw_near(self, tip: FloatArray) -> None:
+        """Move models closer to the kink, on their side of it.
+
+        The difference of two gradients is the normal of a single kink. Where several meet, it may point to a third side;
+        the sides are cones then, and a ray from their tip, here the minimum of the largest model, stays on one. The normal
+        serves if that minimum is not near the tip.
+        """
         first, gradients = self.pieces[0], self.gradients()
+        is_single = len(self.pieces) == 2
         for k in range(1, len(self.pieces)):
-            far = np.abs(self.pieces[k].x - first.x).max()
-            jump = gradients[k] - gradients[0]
-            if weights[k] == 0 or far <= self.near or not jump.any():
+            x, jump = self.pieces[k].x, gradients[k] - gradients[0]
+            far = float(np.abs(x - first.x).max())
+            if far <= self.near:
                 continue
-            way, distance = jump / np.abs(jump).max(), self.near
-            while distance < far:
-                there = self._piece(first.x + distance * way)
-                gradient = there.evaluation.gradient + self.times(first.x - there.x)
-                others = np.linalg.norm(gradients[[0, k]] - gradient, axis=1)
-                if others[1] < others[0]:
-                    self.pieces[k] = there
+            normal, ray = (first.x, jump), (tip, x - tip)
+            for origin, way in (normal,) if is_single else (ray, normal):
+                closer = self._closest(k, gradients, origin, way, far) if way.any() else None
+                if closer is not None:
+                    self.pieces[k] = closer
                     break
-                distance *= _FARTHER
+
+    def _closest(
+        self, k: int, gradients: FloatArray, origin: FloatArray, way: FloatArray, far: float
+    ) -> Piece | None:
+        """Return the model closest to the origin of a ray on the side of model k; None without one nearer than `far`."""
+        own_side = 1.0 if len(gradients) == 2 else _OWN_SIDE
+        unit, distance = way / np.abs(way).max(), self.near
+        while distance < far:
+            there = self._piece(origin + distance * unit)
+            gradient = there.evaluation.gradient + self.times(self.pieces[0].x - there.x)
+            others = np.linalg.norm(gradients - gradient, axis=1)
+            if others[k] < own_side * np.delete(others, k).min():
+                return there
+            distance *= _FARTHER
+        return None
 
     def is_near(self, weights: FloatArray) -> bool:
         """Whether the points of all models with nonzero weight are so close that the Hessian is negligible."""
@@ -281,8 +303,8 @@ def at_rest(landscape: Landscape, state: State, tolerance: float) -> Rest | None
                 least, last_gain = residual, k
             if k - last_gain > _PATIENCE:
                 return None
-            corner.draw_near(weights)
             corner.forget(weights)
+            corner.draw_near(first.x + step)
             corner.add(first.x + step)
             corner.renew()
     except (CrossingError, RuntimeError):

@@ -1,6 +1,7 @@
 """States at rest on corners of the energy, where no side has forces that are zero but a mixture of them is."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from mixtures import bidisperse
 
 import jamshape as js
 from jamshape.files.h5md import read_attributes, read_packing
-from jamshape.landscape import Landscape, State
+from jamshape.landscape import Evaluation, Landscape, State
 from jamshape.minima import Outcome, Stop, minimise, residual_of
 from jamshape.minima.nonsmooth import at_rest, weights_of
 from jamshape.protocols.random_start import random_packing
@@ -99,6 +100,63 @@ def test_a_smooth_minimum_has_one_side(tmp_path):
     found = at_rest(landscape, near, TOLERANCE)
     assert found.n_sides == 1
     assert residual_of(landscape, landscape.evaluate(found.state)).largest <= TOLERANCE
+
+
+class Folded:
+    """A quadratic form with kinks across planes through 0, where it is least; the curvature jumps at each."""
+
+    length, stiffness, bond_force = 1.0, 1.0, 1e-3
+
+    def __init__(self, kinks, seed, size=60):
+        rng = np.random.default_rng(seed)
+        half = rng.normal(size=(size, size))
+        self.smooth = half @ half.T / size + 0.1 * np.eye(size)
+        self.normals = rng.normal(size=(kinks, size))
+        self.normals /= np.linalg.norm(self.normals, axis=1)[:, None]
+        self.jumps = self.bond_force * 10 ** rng.uniform(-2, -1, kinks)
+        self.pull = (self.jumps * rng.uniform(-0.8, 0.8, kinks)) @ self.normals
+        self.bend = rng.uniform(0, 0.5, kinks)
+        self.size, self.law = size, SimpleNamespace(overlap_over_harmonic=lambda _: 1.0)
+
+    def displaced(self, x, step):
+        return x + step
+
+    def evaluate(self, x):
+        across, Hx = self.normals @ x, self.smooth @ x
+        over = np.maximum(across, 0)
+        energy = x @ Hx / 2 - self.pull @ x + self.jumps @ np.abs(across) + self.bend @ over**2 / 2
+        force = (self.jumps * np.where(across > 0, 1, -1) + self.bend * over) @ self.normals
+        return Evaluation(energy + 1e-7, Hx - self.pull + force, None, self.bond_force, 1, None)
+
+    def curvature(self, x):
+        bent = self.bend * (self.normals @ x > 0)
+        return SimpleNamespace(hessian=self.smooth + (self.normals.T * bent) @ self.normals)
+
+    def newton_at(self, x):
+        inverse = np.linalg.inv(self.curvature(x).hessian)
+        return SimpleNamespace(
+            shift=0.0, prepare=lambda: None, solve=lambda gradients, _: gradients @ inverse
+        )
+
+
+@pytest.mark.parametrize("kinks", range(1, 6))
+def test_kinks_that_meet_are_found_together(kinks, monkeypatch):
+    """Their minimum is at 0 by construction; every side of it pulls there."""
+    part, folded = "jamshape.minima.nonsmooth.", Folded(kinks, seed=0)
+    monkeypatch.setattr(
+        part + "LocalEnergyModel",
+        lambda _, x: SimpleNamespace(newton=lambda _: folded.newton_at(x)),
+    )
+    monkeypatch.setattr(part + "least_shift", lambda *_: 0.0)
+    monkeypatch.setattr(
+        part + "residual_of",
+        lambda _, at: SimpleNamespace(largest=np.abs(at.gradient).max() / at.bond_force),
+    )
+    start = 1e-5 * np.random.default_rng(9).normal(size=folded.size)
+    found = at_rest(folded, start, TOLERANCE)
+    assert found.n_sides > kinks
+    assert np.abs(found.state).max() < 1e-9 * folded.bond_force
+    assert np.abs(folded.evaluate(found.state).gradient).max() > 1e-3 * folded.bond_force
 
 
 def test_where_nothing_touches_there_is_no_corner():
