@@ -171,7 +171,7 @@ class Corner:
         serves if that minimum is not near the tip.
         """
         first, gradients = self.pieces[0], self.gradients()
-        is_single = len(self.pieces) == 2
+        is_single = len(self.pieces) == 2  # rays for two models, too, find fewer kinks
         for k in range(1, len(self.pieces)):
             x, jump = self.pieces[k].x, gradients[k] - gradients[0]
             far = float(np.abs(x - first.x).max())
