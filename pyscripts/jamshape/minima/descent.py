@@ -71,12 +71,15 @@ class Stop:
         Exhausted after this number of evaluations of all forces.
     seconds
         Exhausted after this time.
+    kinks
+        Whether to look for a kink of the energy where the minimisation has stalled.
     """
 
     tolerance: float = 1e-8
     lowest: float | None = None
     evaluations: int = 200_000
     seconds: float = np.inf
+    kinks: bool = True
 
 
 @dataclass

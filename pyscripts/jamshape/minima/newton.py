@@ -67,7 +67,8 @@ def _on_a_corner(descent: Descent) -> Outcome | None:
 
     Forces between round particles are continuous.
     """
-    if descent.outcome() is not None or descent.landscape.particles.is_round.all():
+    is_wanted = descent.stop.kinks and descent.outcome() is None
+    if not is_wanted or descent.landscape.particles.is_round.all():
         return None
     found = at_rest(descent.landscape, descent.state, descent.stop.tolerance)
     if found is None:

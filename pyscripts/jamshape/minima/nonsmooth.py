@@ -49,6 +49,10 @@ _OWN_SIDE = 0.25
 # The Hessian is updated after a step of more than this fraction of the overlap.
 _RENEW = 1e-2
 
+# Doubles tell on which side of a kink a point is that is further from it than this, over `Landscape.length`. Long doubles
+# take ten times as long.
+_IN_DOUBLES = 1e-11
+
 _ACCURACY = 1e-9  # of the iterative solution of Newton's equations
 _EPS = float(np.finfo(np.float64).eps)
 
@@ -115,8 +119,8 @@ class Corner:
         return _NEAR * self.tolerance * self.overlap
 
     def _differentiate(self, here: Evaluation) -> None:
-        local_model = LocalEnergyModel(self.landscape, self.base)
-        self._newton = local_model.newton(least_shift(self.landscape, here))
+        self._local_model = LocalEnergyModel(self.landscape, self.base)
+        self._newton = self._local_model.newton(least_shift(self.landscape, here))
         self._newton.prepare()
         self._hessian: Any = self.landscape.curvature(self.base).hessian
 
@@ -191,13 +195,21 @@ class Corner:
         own_side = 1.0 if len(gradients) == 2 else _OWN_SIDE
         unit, distance = way / np.abs(way).max(), self.near
         while distance < far:
-            there = self._piece(origin + distance * unit)
-            gradient = there.evaluation.gradient + self.times(self.pieces[0].x - there.x)
+            x = origin + distance * unit
+            extended = distance < _IN_DOUBLES * self.landscape.length
+            there = self._local_model.evaluate(x, 0.0, extended=extended)
+            gradient = there.gradient + self.times(self.pieces[0].x - x)
             others = np.linalg.norm(gradients - gradient, axis=1)
             if others[k] < own_side * np.delete(others, k).min():
-                return there
+                return self._piece(x)
             distance *= _FARTHER
         return None
+
+    def along(self, step: FloatArray) -> FloatArray:
+        """Return the part of a step along all kinks, which changes no difference of the models."""
+        jumps = (self.gradients()[1:] - self.pieces[0].evaluation.gradient).T
+        across: FloatArray = np.linalg.lstsq(jumps, step, rcond=None)[0]
+        return step - jumps @ across
 
     def is_near(self, weights: FloatArray) -> bool:
         """Whether the points of all models with nonzero weight are so close that the Hessian is negligible."""
@@ -306,6 +318,8 @@ def at_rest(landscape: Landscape, state: State, tolerance: float) -> Rest | None
             corner.forget(weights)
             corner.draw_near(first.x + step)
             corner.add(first.x + step)
+            if k > last_gain and corner.pieces[0] is first:
+                corner.add(first.x + corner.along(step))
             corner.renew()
     except (CrossingError, RuntimeError):
         return None

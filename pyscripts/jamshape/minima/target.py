@@ -427,10 +427,14 @@ class Leading:
 
 
 def _relaxed(landscape: Landscape, at: Minimum, target: Target, u: float) -> Minimum:
-    """Minimise, to full tolerance only if u, the expected energy density, is nearly u0."""
+    """Minimise, to full tolerance only if u, the expected energy density, is nearly u0.
+
+    Before, a stalled state suffices: a search for a kink that fails takes longer than a step.
+    """
     near = abs(landscape.law.root(u / target.u0) - 1) < _NEAR
     tolerance = target.tolerance if near else max(target.tolerance, _GOOD_TO_MOVE)
-    stop = Stop(tolerance, lowest=fraction_of_energy(landscape, _FALLEN) * u)
+    lowest = fraction_of_energy(landscape, _FALLEN) * u
+    stop = Stop(tolerance, lowest=lowest, kinks=near)
     return minimise(landscape, at.state, "near", stop, at.history)
 
 

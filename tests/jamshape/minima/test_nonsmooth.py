@@ -18,7 +18,7 @@ from jamshape.protocols.random_start import random_packing
 TOLERANCE = 1e-8
 N = 32
 SEEDS = (
-    64,
+    23,
     *range(1, 60),
 )  # nearly round rods, of which one packing comes to rest on a corner: the first, on most machines
 
@@ -79,8 +79,9 @@ def test_forces_turn_round_within_a_hair(landscape, state):
 
 
 @chosen_by_seed
-def test_what_is_pushed_away_comes_back(landscape, state):
-    rng = np.random.default_rng(3)
+@pytest.mark.parametrize("seed", range(4))
+def test_what_is_pushed_away_comes_back(landscape, state, seed):
+    rng = np.random.default_rng(seed)
     overlap = landscape.evaluate(state).bond_force * landscape.length**2
     pushed = landscape.displaced(state, 0.03 * overlap * rng.normal(size=landscape.size))
     found = minimise(landscape, pushed, "auto", Stop(TOLERANCE))
@@ -145,7 +146,10 @@ def test_kinks_that_meet_are_found_together(kinks, monkeypatch):
     part, folded = "jamshape.minima.nonsmooth.", Folded(kinks, seed=0)
     monkeypatch.setattr(
         part + "LocalEnergyModel",
-        lambda _, x: SimpleNamespace(newton=lambda _: folded.newton_at(x)),
+        lambda _, x: SimpleNamespace(
+            newton=lambda _: folded.newton_at(x),
+            evaluate=lambda step, _, extended: folded.evaluate(x + step),
+        ),
     )
     monkeypatch.setattr(part + "least_shift", lambda *_: 0.0)
     monkeypatch.setattr(
