@@ -150,6 +150,11 @@ class Descent {
   static constexpr double AWAY = 30.0, LATER = 0.3;
   static constexpr int MOST_RETURNS = 5;
 
+  /// It resumes as often as the energy falls below this fraction of that at which Newton's method
+  /// took over, during more evaluations than of a start near a minimum: it follows long slides at a
+  /// fraction of the price, since a step of Newton's method ends at the first contact that closes.
+  static constexpr double FALLEN = 0.97;
+
   /// L-BFGS also resumes if a start declared near a minimum is not near one after this many
   /// evaluations, with complete factors or without them.
   static constexpr std::int64_t NEAR = 250, NEAR_BY_ITERATIONS = 40;
@@ -174,6 +179,8 @@ class Descent {
 
   /// Rounding above which extended precision takes over, over the residual and over the tolerance.
   static constexpr double OF_RESIDUAL = 0.01, OF_TOLERANCE = 0.1;
+  /// Doubles suffice again where the residual has risen by this factor, as where particles slide.
+  static constexpr double AGAIN = 10.0;
 
   /// Newton's equations are solved to this relative accuracy, or to the square root of the
   /// residual.
@@ -209,6 +216,7 @@ class Descent {
   int age = 0, preconditioned = 0, saddles = 0, returns = 0;
   std::shared_ptr<Factors> near;
   std::vector<DescentRow> rows;
+  DescentRow taken_over{0.0, 0, 0.0, INFINITY};  // where the present method took over
   std::int64_t evaluations = 0;
   double least_energy = INFINITY, least_residual = INFINITY;
   std::size_t most_bonds = 0;  // since the energy or the residual gained
@@ -235,7 +243,7 @@ class Descent {
   {
     if (by_newton) {
       if (!is_astray()) return;
-      if (!is_near) ++returns;
+      if (!is_near && !is_sliding()) ++returns;
       if (!is_near && !about.has_complete_factors()) newton_below *= LATER;
       is_near = false;
       memory.forget();
@@ -244,11 +252,21 @@ class Descent {
     }
     by_newton = !by_newton;
     best = evaluations;
+    taken_over = rows.back();
+  }
+
+  /// Whether the packing slides into another region of the landscape, and is not near its end.
+  bool is_sliding() const
+  {
+    return about.has_complete_factors() && residual() >= newton_below &&
+           rows.back().energy_density < FALLEN * taken_over.energy_density &&
+           evaluations > taken_over.evaluations + NEAR;
   }
 
   /// Whether Newton's method should be left while contacts still open and close.
   bool is_astray() const
   {
+    if (is_sliding()) return true;
     if (is_near) {
       const auto most = about.has_complete_factors() ? NEAR : NEAR_BY_ITERATIONS;
       return residual() >= newton_below && evaluations > most;
@@ -346,9 +364,14 @@ class Descent {
 
   bool needs_more_digits(const LandscapeSums &sums) const
   {
-    if (sums.n_bonds == 0) return false;
-    const double left = stop.rounding / (sums.bond_force / sums.n_bonds);
+    const double left = rounding_of(sums);
     return left > OF_TOLERANCE * stop.tolerance && left > OF_RESIDUAL * residual_of(about, sums);
+  }
+
+  /// Residual that rounding of doubles leaves.
+  double rounding_of(const LandscapeSums &sums) const
+  {
+    return sums.n_bonds == 0 ? 0.0 : stop.rounding / (sums.bond_force / sums.n_bonds);
   }
 
   void record(const LandscapeSums &sums)
@@ -359,6 +382,7 @@ class Descent {
     for (int k = 0; k < D; ++k) volume *= about.poses().cell[0][(D + 1) * k];
     rows.push_back({seconds, evaluations, residual_of(about, sums), sums.energy / volume});
     const double left = rows.back().residual, density = rows.back().energy_density;
+    extended = extended && rounding_of(sums) > OF_RESIDUAL / AGAIN * left;
     if (density < LESS_ENERGY * least_energy || left < LESS_RESIDUAL * least_residual) {
       last_gain = best = evaluations;
       least_energy = std::min(least_energy, density);
