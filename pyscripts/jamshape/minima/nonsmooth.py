@@ -208,8 +208,8 @@ class Corner:
     def along(self, step: FloatArray) -> FloatArray:
         """Return the part of a step along all kinks, which changes no difference of the models."""
         jumps = (self.gradients()[1:] - self.pieces[0].evaluation.gradient).T
-        across: FloatArray = np.linalg.lstsq(jumps, step, rcond=None)[0]
-        return step - jumps @ across
+        across = np.linalg.lstsq(jumps, step, rcond=None)[0]
+        return np.asarray(step - jumps @ across)
 
     def is_near(self, weights: FloatArray) -> bool:
         """Whether the points of all models with nonzero weight are so close that the Hessian is negligible."""

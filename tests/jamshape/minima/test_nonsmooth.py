@@ -148,7 +148,7 @@ def test_kinks_that_meet_are_found_together(kinks, monkeypatch):
         part + "LocalEnergyModel",
         lambda _, x: SimpleNamespace(
             newton=lambda _: folded.newton_at(x),
-            evaluate=lambda step, _, extended: folded.evaluate(x + step),
+            evaluate=lambda step, *_, **__: folded.evaluate(x + step),
         ),
     )
     monkeypatch.setattr(part + "least_shift", lambda *_: 0.0)
