@@ -8,6 +8,7 @@ import warnings
 
 import numpy as np
 import pytest
+from chosen_seeds import chosen_among
 from dumps import read_dump
 from every_shape import (
     EPS,
@@ -178,7 +179,9 @@ def test_forces_of_extreme_bodies_stay_right_in_motion(name, tmp_path, measured)
     assert 0 < energy < energy_of(packing)
 
 
-@EVERY
+@pytest.mark.parametrize(
+    "case", chosen_among([*TYPICAL, *MIXTURES], ("spherocylinder-2D-mixture",)), ids=str
+)
 @pytest.mark.parametrize("style", ["cg", "sd"])
 def test_minimisers_relax_positions_and_orientations(case, style, tmp_path, measured):
     packing = pressed(case)

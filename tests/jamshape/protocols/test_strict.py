@@ -44,6 +44,8 @@ def between_flat_sides():
     return landscape, minimise(landscape, State.of(packing), "newton", Stop(1e-8))
 
 
+@chosen_by_seed
+@chosen_by_seed
 def test_what_slides_between_flat_sides_is_at_a_saddle():
     landscape, minimum = between_flat_sides()
     assert minimum.outcome is Outcome.CONVERGED
