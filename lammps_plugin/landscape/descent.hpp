@@ -150,14 +150,15 @@ class Descent {
   static constexpr double AWAY = 30.0, LATER = 0.3;
   static constexpr int MOST_RETURNS = 5;
 
-  /// It resumes as often as the energy falls below this fraction of that at which Newton's method
-  /// took over, during more evaluations than of a start near a minimum: it follows long slides at a
-  /// fraction of the price, since a step of Newton's method ends at the first contact that closes.
+  /// With complete factors it also resumes, any number of times, if the energy is below this
+  /// fraction of that at which Newton's method took over, after this many evaluations: it follows
+  /// long slides at a fraction of the price, since a step of Newton's method ends at the first
+  /// contact that closes. A start declared near a minimum counts as fallen.
   static constexpr double FALLEN = 0.97;
+  static constexpr std::int64_t NEAR = 250;
 
-  /// L-BFGS also resumes if a start declared near a minimum is not near one after this many
-  /// evaluations, with complete factors or without them.
-  static constexpr std::int64_t NEAR = 250, NEAR_BY_ITERATIONS = 40;
+  /// Without them it resumes if a start declared near a minimum is not near one after this many.
+  static constexpr std::int64_t NEAR_BY_ITERATIONS = 40;
 
   /// Largest number of saddles left in one minimisation.
   static constexpr int MOST_SADDLES = 5;
@@ -266,12 +267,12 @@ class Descent {
   /// Whether Newton's method should be left while contacts still open and close.
   bool is_astray() const
   {
+    const bool is_complete = about.has_complete_factors();
     if (is_sliding()) return true;
     if (is_near) {
-      const auto most = about.has_complete_factors() ? NEAR : NEAR_BY_ITERATIONS;
-      return residual() >= newton_below && evaluations > most;
+      return !is_complete && residual() >= newton_below && evaluations > NEAR_BY_ITERATIONS;
     }
-    if (about.has_complete_factors() && returns == MOST_RETURNS) return false;
+    if (is_complete && returns == MOST_RETURNS) return false;
     return residual() >= AWAY * newton_below;
   }
 

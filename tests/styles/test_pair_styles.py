@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from chosen_seeds import chosen_among
+from chosen_seeds import chosen_with_avx512
 from every_shape import MIXTURES, TYPICAL, size_of
 from lammps_runs import (
     BONDS,
@@ -91,9 +91,8 @@ CASES = [
     for newton in newton_of(name, ranks)
 ]
 # A bond of a weight that is rounding to the fifth power, 1e-80, counts in one program and not in the other.
-CHOSEN = ("spheropolygon-2D-mixture-barely-two-on-1",)
-EVERY = pytest.mark.parametrize("case", chosen_among(CASES, CHOSEN), ids=str)
-NOT_EXTREME = [case for case in CASES if not case.name.startswith("extreme")]
+CHOSEN = "spheropolygon-2D-mixture-barely"
+EVERY = pytest.mark.parametrize("case", CASES, ids=str)
 
 
 def text_of(case, folder, label):
@@ -350,8 +349,10 @@ def assert_same_rows(found, expected, packing, limit):
 
 
 # Where faces lie on each other, the point is known far less well than the forces.
-@pytest.mark.parametrize("case", chosen_among(NOT_EXTREME, CHOSEN), ids=str)
-def test_rows_of_contact_local_are_the_bonds_of_the_library(case, found_in):
+@pytest.mark.parametrize("case", [c for c in CASES if not c.name.startswith("extreme")], ids=str)
+def test_rows_of_contact_local_are_the_bonds_of_the_library(case, found_in, request):
+    if case.name == CHOSEN:
+        request.applymarker(chosen_with_avx512)
     state, _, rows = found_in(case)
     network = find_contacts(state.packing, K_E, case.sides)
     limit = max(10 * limit_of(case.name, network), 1e-13)
@@ -427,7 +428,9 @@ def expected_vector(packing, network):
 
 
 @EVERY
-def test_compute_packing_is_what_the_library_measures(case, found_in, measured):
+def test_compute_packing_is_what_the_library_measures(case, found_in, measured, request):
+    if case.name == CHOSEN:
+        request.applymarker(chosen_with_avx512)
     state, thermo, _ = found_in(case)
     network = find_contacts(state.packing, K_E, case.sides)
     expected = expected_vector(state.packing, network)

@@ -3,7 +3,7 @@
 import mpmath
 import numpy as np
 import pytest
-from chosen_seeds import chosen_by_seed
+from chosen_seeds import chosen_by_seed, chosen_with_avx512
 from making import stages_of, write_every_mark
 from mixtures import bidisperse
 
@@ -44,8 +44,7 @@ def between_flat_sides():
     return landscape, minimise(landscape, State.of(packing), "newton", Stop(1e-8))
 
 
-@chosen_by_seed
-@chosen_by_seed
+@chosen_with_avx512
 def test_what_slides_between_flat_sides_is_at_a_saddle():
     landscape, minimum = between_flat_sides()
     assert minimum.outcome is Outcome.CONVERGED
