@@ -27,7 +27,7 @@ from common.ensembles import OTHERS
 from jamshape.command import parser_of, report, run
 from jamshape.files.h5md import read_attributes, read_style
 from jamshape.files.outcomes import is_reached
-from jamshape.measures.runs import rate_of
+from jamshape.measures.runs import onset_report
 from jamshape.measures.shears import read_shear
 from jamshape.vibration.ensembles import TOLD, count_of, of_packing
 from jamshape.vibration.table import read_modes
@@ -39,7 +39,7 @@ PACKING = (
     "z_bearing", "n_rattlers", "n_bonds", "S2", "S4", "C4", "residual_force", "residual_torque", "tolerance", "outcome", "wall_seconds",
 )  # fmt: skip
 RUN = (
-    *SHAPE, "sides", "kappa", "phi_start", "phi_end", "method", "phi_unjams", "phi_jams", "frames_minimised",
+    *SHAPE, "sides", "kappa", "phi_start", "phi_end", "method", "phi_J(kappa)", "phi_J(kappa)_error", "phi_unjams", "phi_jams", "frames_minimised",
     "frames_undecided", "flow_steps", "flow_evaluations", "flow_wall_seconds",
 )  # fmt: skip
 MODES = (
@@ -62,9 +62,9 @@ def told_packing(path: Path) -> dict[str, Any]:
 
 
 def told_run(path: Path) -> dict[str, Any] | None:
-    """Read what a run is, and its rate at the end; None of one that was not finished."""
+    """Read what a run is, its rate at the end and the onset of its pressure; None of one that was not finished."""
     found = read_attributes(path)
-    return found | {"kappa": rate_of(found)} if found.get("finished") else None
+    return found | onset_report(path) if found.get("finished") else None
 
 
 def told_modes(path: Path) -> dict[str, Any]:

@@ -2,13 +2,22 @@
 
 import csv
 
+import numpy as np
 import pytest
+from written import write_content
 
 import jamshape as js
 from common.ensembles import read_groups
-from jamshape.files.h5md import read_attributes, write_packing
+from jamshape.files.h5md import read_attributes
 
 SCRIPT = "sample_tables.py"
+
+PHI_J = 0.857
+ROWS = [
+    (step, float(step), {"phi": phi, "pressure": 0.2 * max(phi - PHI_J, 0.0)})
+    for step, phi in enumerate(np.linspace(0.8, 0.9, 81).tolist())
+]
+"""Of a run whose pressure is a line from PHI_J on."""
 
 
 def table(path):
@@ -32,8 +41,9 @@ def folder(tmp_path_factory):
     (root / "runs").mkdir()
     for name, finished in (("slow1", True), ("slow2", False)):
         rates = [[0.8, 1e-6], [0.85, 1e-8]]  # from these packing fractions on
-        known = {"alpha": 4.0, "kappa": rates, "phi_jams": 0.86, "finished": finished}
-        write_packing(root / "runs" / f"{name}.h5", js.load(packing), known)
+        known = {"alpha": 4.0, "kappa": rates, "finished": finished}
+        known |= {"phi_unjams": 0.85, "phi_jams": 0.86, "frames_minimised": 2, "frames_undecided": 0}
+        write_content(root / "runs" / f"{name}.h5", [js.load(packing)], known, ROWS)
     return root
 
 
@@ -53,6 +63,8 @@ def test_runs_that_were_not_finished_are_left_out(folder, report):
     report(SCRIPT, folder, "--out", folder / "samples")
     [run] = table(folder / "samples" / "runs.csv")
     assert (run["file"], run["kappa"], run["phi_jams"]) == ("runs/slow1.h5", "1e-08", "0.86")
+    assert float(run["phi_J(kappa)"]) == pytest.approx(PHI_J, abs=1e-9)
+    assert 0 <= float(run["phi_J(kappa)_error"]) < 1e-9
 
 
 def test_modes_are_counted_by_band_beside_their_packing(folder, report):
