@@ -117,7 +117,9 @@ def wait_until(condition, seconds):
 
 
 @pytest.mark.skipif(not Path("/proc/self/cmdline").exists(), reason="needs /proc")
-@pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGINT])
+@pytest.mark.parametrize(
+    "ending", [signal.SIGKILL, pytest.param(signal.SIGINT, marks=pytest.mark.validate)]
+)
 def test_a_sweep_that_is_killed_alone_leaves_no_process_and_goes_on(tmp_path, ending, measured):
     samples = ("--alpha", "0", "1", "--samples", "2")
     with subprocess.Popen(

@@ -67,7 +67,7 @@ def whole(tmp_path_factory):
     return of
 
 
-@pytest.mark.parametrize("name", quick(PACKINGS, {"strict", "Monte Carlo", "dynamics"}))
+@pytest.mark.parametrize("name", quick(PACKINGS, {"strict", "Monte Carlo"}))
 def test_checkpoints_do_not_change_a_packing(name, whole, tmp_path):
     file = tmp_path / "packing.h5"
     code = ended(forked(pack, (name, file), tmp_path / "said.log", (*MARKS, *EVERY)))
@@ -86,7 +86,7 @@ def put_down(name, file):
     assert stops > 2
 
 
-@pytest.mark.parametrize("name", quick(PACKINGS, {"long rods", "equal steps", "dynamics"}))
+@pytest.mark.parametrize("name", quick(PACKINGS, {"long rods", "equal steps"}))
 def test_a_packing_put_down_again_and_again_ends_as_if_it_were_not(name, whole, tmp_path):
     file = tmp_path / "packing.h5"
     code = ended(forked(put_down, (name, file), tmp_path / "said.log", (*MARKS, *NONE)), 240)
