@@ -158,7 +158,7 @@ def duration(one: Run, kappa: ArrayLike) -> float:
 def draw(rates: list[Rate], packings: dict[Place, list[float]], out: Path) -> None:
     """Draw one column for each system and N; `packings` are their phi_J."""
     places = list(dict.fromkeys(of.place for of in rates))
-    figure = figure_of(4.5 * len(places), 6, dpi=100)
+    figure = figure_of(4.5 * len(places), 7, dpi=100)
     axes = figure.subplots(2, len(places), squeeze=False, sharex="col")
     for place, (linear, logarithmic) in zip(places, axes.T, strict=True):
         own = [of for of in rates if of.place == place]
@@ -173,7 +173,9 @@ def draw(rates: list[Rate], packings: dict[Place, list[float]], out: Path) -> No
         logarithmic.set_ylim(
             bottom=LEAST * max(one.pressure.max() for of in own for one in of.runs)
         )
-        linear.legend(title="thick: mean, thin: each sample", **SMALL_TEXT)
+        # Below, where it hides no curve.
+        below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.17), "ncols": 2}
+        logarithmic.legend(title="thick: mean, thin: each sample", **below, **SMALL_TEXT)
     save_figure(figure, out)
 
 

@@ -91,7 +91,7 @@ def table_columns():
 def test_every_column_is_defined():
     pages = (REFERENCE / "columns.md", ROOT / "docs" / "explanation" / "files.md")
     defined = set(
-        re.findall(r"`(\w+)`", "".join(page.read_text(encoding="utf-8") for page in pages))
+        re.findall(r"`([\w()]+)`", "".join(page.read_text(encoding="utf-8") for page in pages))
     )
     runs = {*CyclicShear.of_packing, *CyclicShear.of_fix, *Row._fields}
     assert {*runs, *table_columns()} - {"step", *BANDS.values()} - defined == set()

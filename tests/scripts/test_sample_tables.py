@@ -42,7 +42,12 @@ def folder(tmp_path_factory):
     for name, finished in (("slow1", True), ("slow2", False)):
         rates = [[0.8, 1e-6], [0.85, 1e-8]]  # from these packing fractions on
         known = {"alpha": 4.0, "kappa": rates, "finished": finished}
-        known |= {"phi_unjams": 0.85, "phi_jams": 0.86, "frames_minimised": 2, "frames_undecided": 0}
+        known |= {
+            "phi_unjams": 0.85,
+            "phi_jams": 0.86,
+            "frames_minimised": 2,
+            "frames_undecided": 0,
+        }
         write_content(root / "runs" / f"{name}.h5", [js.load(packing)], known, ROWS)
     return root
 
