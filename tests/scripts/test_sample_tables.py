@@ -4,7 +4,7 @@ import csv
 
 import numpy as np
 import pytest
-from written import write_content
+from written import write_columns
 
 import jamshape as js
 from common.ensembles import read_groups
@@ -13,11 +13,8 @@ from jamshape.files.h5md import read_attributes
 SCRIPT = "sample_tables.py"
 
 PHI_J = 0.857
-ROWS = [
-    (step, float(step), {"phi": phi, "pressure": 0.2 * max(phi - PHI_J, 0.0)})
-    for step, phi in enumerate(np.linspace(0.8, 0.9, 81).tolist())
-]
-"""Of a run whose pressure is a line from PHI_J on."""
+PHI = np.linspace(0.8, 0.9, 81)
+RISING = {"phi": PHI, "pressure": 0.2 * np.maximum(PHI - PHI_J, 0)}
 
 
 def table(path):
@@ -48,7 +45,7 @@ def folder(tmp_path_factory):
             "frames_minimised": 2,
             "frames_undecided": 0,
         }
-        write_content(root / "runs" / f"{name}.h5", [js.load(packing)], known, ROWS)
+        write_columns(root / "runs" / f"{name}.h5", js.load(packing), known, RISING)
     return root
 
 
