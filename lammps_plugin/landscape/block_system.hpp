@@ -1,6 +1,7 @@
 #pragma once
 
 #include "landscape/block_factors.hpp"
+#include "landscape/conjugate_gradients.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -61,25 +62,16 @@ template <int BLOCK> class IteratedFactors : public Factors {
 
   Eigen::VectorXd solve(const Eigen::Ref<const Eigen::VectorXd> &right) const override
   {
-    Eigen::VectorXd x = Eigen::VectorXd::Zero(right.size());
-    Eigen::VectorXd rest = right, preconditioned = near->solve(rest), along = preconditioned;
-    double product = rest.dot(preconditioned);
-    const double enough = REMAINDER * REMAINDER * product;
-    for (Eigen::Index k = 0; k < right.size() && product > enough; ++k) {
+    const auto times = [&](const Eigen::VectorXd &along) {
       BlockRows<BLOCK> from(*pattern, along), to(*pattern);
       kernels.multiply(matrix.view(*pattern), from.data(), to.data());
-      const Eigen::VectorXd pulled = to.gathered();
-      const double curvature = along.dot(pulled);
-      if (!(curvature > 0.0)) return k > 0 ? x : along;
-      const double length = product / curvature;
-      x += length * along;
-      rest -= length * pulled;
-      preconditioned = near->solve(rest);
-      const double next = rest.dot(preconditioned);
-      along = preconditioned + (next / product) * along;
-      product = next;
-    }
-    return x;
+      return to.gathered();
+    };
+    const auto solve_nearly = [&](const Eigen::VectorXd &rest) { return near->solve(rest); };
+    const auto is_done = [](const Eigen::VectorXd &, double part) {
+      return !(part > REMAINDER * REMAINDER);
+    };
+    return conjugate_gradients(right, right.size(), times, solve_nearly, is_done).x;
   }
 
  private:

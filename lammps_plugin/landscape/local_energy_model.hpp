@@ -168,9 +168,9 @@ class LocalEnergyModel {
   virtual double largest_part(const double *vector) const = 0;
 
   /// Computes second derivatives with respect to the base's coordinates, for the functions below,
-  /// whose factors will have at most this fill-in. In 3D at points without rotations. Crossing
+  /// whose factors will have this fill-in. In 3D at points without rotations. Crossing
   /// spines contribute nothing.
-  virtual void differentiate(const Displacement &at, Fill most) = 0;
+  virtual void differentiate(const Displacement &at, Fill with) = 0;
   /// (n,) derivative of the gradient with respect to the strain, at that point.
   virtual const Eigen::VectorXd &coupling() const = 0;
   /// Second derivative of the energy with respect to the strain, at that point.
@@ -182,7 +182,7 @@ class LocalEnergyModel {
   /// (n,) for displacements the largest of their diagonal elements, for rotations that of theirs:
   /// nearly round particles rotate far more easily than they move.
   virtual Eigen::VectorXd largest_of_kind() const = 0;
-  /// Whether `factors` can be those of the Hessian, or only of an approximation.
+  /// Whether complete factors are always cheap.
   virtual bool has_complete_factors() const = 0;
   /// Factors of that Hessian plus a diagonal (n,); null if a pivot is not positive.
   virtual std::shared_ptr<Factors> factors(const Eigen::VectorXd &diagonal) = 0;
@@ -191,7 +191,7 @@ class LocalEnergyModel {
   /// null for non-finite matrices.
   std::shared_ptr<Factors> factorise(const Displacement &at, const Eigen::VectorXd &added)
   {
-    differentiate(at, Fill::COMPLETE);
+    differentiate(at, has_complete_factors() ? Fill::COMPLETE : Fill::NONE);
     const Eigen::VectorXd sum = diagonal() + added;
     if (!sum.allFinite()) return nullptr;
     const double smallest = sum.size() > 0 ? sum.minCoeff() : 1.0;
@@ -364,9 +364,8 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     return std::sqrt(most);
   }
 
-  void differentiate(const Displacement &at, Fill most) override
+  void differentiate(const Displacement &at, Fill with) override
   {
-    const Fill with = most == Fill::COMPLETE ? fill() : most;
     const Moved &posed = moved_to(at);
     std::unique_ptr<BlockSystem> &own = systems[with == Fill::COMPLETE];
     if (!own || with == Fill::NONE) own = block_system(posed, at, with);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "landscape/conjugate_gradients.hpp"
 #include "landscape/local_energy_model.hpp"
 
 #include <algorithm>
@@ -18,7 +19,8 @@ namespace jamshape {
 /// shift, kept from one base to the next, makes the Hessian H positive definite. Solved by complete
 /// factors where these are cheap, which serve as long as few contacts open or close, else by
 /// conjugate gradients preconditioned with incomplete ones (Nocedal & Wright, Numerical
-/// Optimization, Sec. 7.1).
+/// Optimization, Sec. 7.1), until these take longer than complete factors, as close to isostatic
+/// packings.
 class NewtonSystem {
  public:
   using Vector = Eigen::VectorXd;
@@ -35,45 +37,51 @@ class NewtonSystem {
   /// positive.
   void prepare()
   {
-    const Vector origin = Vector::Zero(static_cast<Eigen::Index>(about.n()));
-    about.differentiate({origin.data(), 0.0}, Fill::COMPLETE);
+    differentiate(about.has_complete_factors() ? Fill::COMPLETE : Fill::NONE);
     const double largest = about.n() > 0 ? about.diagonal().cwiseAbs().maxCoeff() : 0.0;
     if (!std::isfinite(largest))
       throw std::runtime_error("The Hessian has elements that are not finite.");
     scale = largest > 0.0 ? largest : 1.0;
     shift = std::max(shift, LEAST_SHIFT * scale);
-    is_old = about.has_complete_factors() && factors && factors->size() == about.n() && !is_far;
-    if (!is_old) factorise();
+    incomplete = nullptr;
+    is_old = complete && complete->size() == about.n() && !is_far;
+    if (!is_old) complete = nullptr;
+    if (!is_old && about.has_complete_factors()) factorise();
   }
 
   /// Solves to a relative accuracy, used by iterations only.
   Vector solve(const Vector &right, double accuracy)
   {
-    if (about.has_complete_factors()) {
-      if (is_old) factorise();
-      return factors->solve(right);
-    }
-    while (true) {
-      const Iterated found = iterate(right, accuracy * right.norm());
-      if (found.is_solution) return found.x;
+    while (!about.has_complete_factors()) {
+      const Iterated found = with_incomplete_factors(right, accuracy, few());
+      if (found.end == Solved::YES) return found.x;
+      if (found.end == Solved::TOO_LONG) break;
       shift *= GROWTH;
-      factorise();
+      incomplete = nullptr;
     }
+    if (is_old || !complete) factorise();
+    return complete->solve(right);
   }
 
   /// A descent direction from a gradient: the solution, or a direction of negative curvature that
-  /// the iterations met (Alg. 7.1 there).
+  /// the iterations met.
   Vector direction(const Vector &gradient, double accuracy)
   {
-    if (about.has_complete_factors()) {
-      if (is_old) {
-        const Iterated found = with_old_factors(gradient, accuracy);
-        if (found.is_solution) return -found.x;
-        factorise();
-      }
-      return -factors->solve(gradient);
+    if (is_old) {
+      const Iterated found = with_old_factors(gradient, accuracy);
+      if (found.end == Solved::YES) return -found.x;
+      complete = nullptr;
     }
-    return -iterate(gradient, accuracy * gradient.norm()).x;
+    if (about.has_complete_factors()) {
+      if (!complete) factorise();
+      return -complete->solve(gradient);
+    }
+    Iterated found = with_incomplete_factors(gradient, accuracy, few());
+    if (found.end == Solved::TOO_LONG) {
+      if (is_positive()) return -complete->solve(gradient);
+      found = with_incomplete_factors(gradient, accuracy, gradient.size());
+    }
+    return -found.x;
   }
 
   /// A direction in which the negative curvature of the Hessian, as last prepared, exceeds this;
@@ -81,12 +89,17 @@ class NewtonSystem {
   std::optional<Vector> falling(double curvature)
   {
     const double before = std::exchange(shift, curvature);
-    factorise();
-    shift = curvature;  // the factors may have a larger shift
-    const Iterated found = iterate(some_vector(), FALLING);
+    std::optional<Vector> found;
+    if (about.n() > MANY || !is_positive()) {
+      incomplete = nullptr;
+      const Factors &near = approximate();
+      const Vector from = some_vector();
+      const Iterated along = iterate(near, from, FALLING, from.size());
+      if (along.end == Solved::FALLS) found = along.last;
+    }
     shift = before;
-    if (found.is_solution) return {};
-    return found.last;
+    incomplete = complete = nullptr;
+    return found;
   }
 
   /// Lowers the shift after a step that was taken as a whole, raises it if a small part was.
@@ -119,21 +132,58 @@ class NewtonSystem {
   /// Smallest shift of incomplete factors, over the largest diagonal element, if pivots need one.
   static constexpr double INCOMPLETE = 1e-4;
 
+  /// Iterations with incomplete factors, over the number of coordinates, that take as long as
+  /// complete factors: 0.06 to 0.13 for 400 to 1000 spheres or spheroids. Beyond so many
+  /// coordinates the memory of complete factors grows too large.
+  static constexpr double FEW = 0.1;
+  static constexpr Eigen::Index MANY = 30000;
+
   LocalEnergyModel &about;
   double scale = 1.0;
-  std::shared_ptr<Factors> factors;
-  bool is_old = false, is_far = false;  // factors of an earlier base; too far from it
+  std::shared_ptr<Factors> complete, incomplete;
+  bool is_old = false, is_far = false;  // complete factors of an earlier base; too far from it
 
+  Eigen::Index few() const
+  {
+    const auto n = static_cast<Eigen::Index>(about.n());
+    return n > MANY ? n : static_cast<Eigen::Index>(FEW * n);
+  }
+
+  void differentiate(Fill fill)
+  {
+    const Vector origin = Vector::Zero(static_cast<Eigen::Index>(about.n()));
+    about.differentiate({origin.data(), 0.0}, fill);
+  }
+
+  /// Whether the Hessian with its shift is positive definite; then it has complete factors.
+  bool is_positive()
+  {
+    if (!about.has_complete_factors()) differentiate(Fill::COMPLETE);
+    is_old = is_far = false;
+    complete = factors_with(shift);
+    return complete != nullptr;
+  }
+
+  /// Makes complete factors, and raises the shift until all pivots are positive.
   void factorise()
   {
-    is_old = is_far = false;
-    const bool complete = about.has_complete_factors();
-    double added = shift;
-    while (!(factors = factors_with(added))) {
-      added = complete ? GROWTH * added : std::max(GROWTH * added, INCOMPLETE * scale);
-      if (!std::isfinite(added)) throw std::runtime_error("The Hessian cannot be factorised.");
+    while (!is_positive()) raise(shift);
+  }
+
+  /// Factors near the Hessian, incomplete ones if these were prepared.
+  const Factors &approximate()
+  {
+    for (double added = shift; !incomplete && !(incomplete = factors_with(added));) {
+      raise(added);
+      if (!about.has_complete_factors()) added = std::max(added, INCOMPLETE * scale);
     }
-    if (complete) shift = added;
+    return *incomplete;
+  }
+
+  static void raise(double &added)
+  {
+    added *= GROWTH;
+    if (!std::isfinite(added)) throw std::runtime_error("The Hessian cannot be factorised.");
   }
 
   std::shared_ptr<Factors> factors_with(double added)
@@ -141,11 +191,6 @@ class NewtonSystem {
     ++factorisations;
     return about.factors(Vector::Constant(static_cast<Eigen::Index>(about.n()), added));
   }
-
-  struct Iterated {
-    Vector x, last;  // x and the last direction
-    bool is_solution;
-  };
 
   /// A fixed unit vector with a component along every mode.
   Vector some_vector() const
@@ -156,56 +201,41 @@ class NewtonSystem {
     return found.normalized();
   }
 
-  /// A solution by conjugate gradients preconditioned with complete factors of an earlier base,
-  /// from which the matrix differs by the few contacts that have opened or closed. No solution if
-  /// it differs too much; in the norm of the factors, as soft modes have small forces.
+  /// A solution by iterations with complete factors of an earlier base, from which the matrix
+  /// differs by the few contacts that have opened or closed. None if it differs too much; in the
+  /// norm of the factors, as soft modes have small forces.
   Iterated with_old_factors(const Vector &right, double accuracy)
   {
-    Vector x = Vector::Zero(right.size());
-    Vector rest = right, preconditioned = factors->solve(rest), along = preconditioned;
-    double product = rest.dot(preconditioned);
-    const double enough = REMAINDER * REMAINDER * accuracy * accuracy * product;
-    for (int k = 0; k < MOST_ITERATIONS; ++k) {
-      const Vector pulled = about.times(along) + shift * along;
-      ++products;
-      const double curvature = along.dot(pulled);
-      if (!(curvature > 0.0)) break;
-      const double length = product / curvature;
-      x += length * along;
-      rest -= length * pulled;
-      preconditioned = factors->solve(rest);
-      const double next = rest.dot(preconditioned);
-      if (next <= enough) {
-        is_far = 2 * k > MOST_ITERATIONS;
-        return {x, along, true};
-      }
-      along = preconditioned + (next / product) * along;
-      product = next;
-    }
-    return {x, along, false};
+    const double enough = REMAINDER * accuracy;
+    const Iterated found =
+        iterated(*complete, right, MOST_ITERATIONS,
+                 [&](const Vector &, double part) { return !(part > enough * enough); });
+    is_far = 2 * (found.n - 1) > MOST_ITERATIONS;
+    return found;
   }
 
-  /// Preconditioned conjugate gradients, which in exact arithmetic end after as many steps as there
-  /// are coordinates; or stop where the matrix is not positive definite.
-  Iterated iterate(const Vector &right, double remainder)
+  Iterated with_incomplete_factors(const Vector &right, double accuracy, Eigen::Index most)
   {
-    Vector x = Vector::Zero(right.size());
-    Vector rest = right, preconditioned = factors->solve(rest), along = preconditioned;
-    double product = rest.dot(preconditioned);
-    for (Eigen::Index k = 0; k < right.size() && rest.norm() > remainder; ++k) {
-      const Vector pulled = about.times(along) + shift * along;
-      ++products;
-      const double curvature = along.dot(pulled);
-      if (!(curvature > 0.0)) return {k > 0 ? x : along, along, false};
-      const double length = product / curvature;
-      x += length * along;
-      rest -= length * pulled;
-      preconditioned = factors->solve(rest);
-      const double next = rest.dot(preconditioned);
-      along = preconditioned + (next / product) * along;
-      product = next;
-    }
-    return {x, along, true};
+    return iterate(approximate(), right, accuracy * right.norm(), most);
+  }
+
+  Iterated iterate(const Factors &near, const Vector &right, double remainder, Eigen::Index most)
+  {
+    return iterated(near, right, most,
+                    [&](const Vector &rest, double) { return rest.norm() <= remainder; });
+  }
+
+  template <class IsDone>
+  Iterated iterated(const Factors &near, const Vector &right, Eigen::Index most,
+                    const IsDone &is_done)
+  {
+    const auto times = [&](const Vector &along) -> Vector {
+      return about.times(along) + shift * along;
+    };
+    const auto solve_nearly = [&](const Vector &rest) { return near.solve(rest); };
+    Iterated found = conjugate_gradients(right, most, times, solve_nearly, is_done);
+    products += static_cast<int>(found.n);
+    return found;
   }
 };
 
