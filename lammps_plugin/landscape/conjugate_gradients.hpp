@@ -4,7 +4,7 @@
 
 namespace jamshape {
 
-/// How conjugate gradients ended: with a solution, along a direction of negative curvature, or
+/// End of conjugate gradients: with a solution, along a direction of negative curvature, or
 /// after the allowed number of iterations.
 enum class Solved { YES, FALLS, TOO_LONG };
 

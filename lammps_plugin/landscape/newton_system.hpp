@@ -133,7 +133,7 @@ class NewtonSystem {
   static constexpr double INCOMPLETE = 1e-4;
 
   /// Iterations with incomplete factors, over the number of coordinates, that take as long as
-  /// complete factors: 0.06 to 0.13 for 400 to 1000 spheres or spheroids. Beyond so many
+  /// complete factors: 0.06 to 0.13 for 400 to 1000 spheres or spheroids. With more than MANY
   /// coordinates the memory of complete factors grows too large.
   static constexpr double FEW = 0.1;
   static constexpr Eigen::Index MANY = 30000;
