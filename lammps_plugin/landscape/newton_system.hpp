@@ -88,17 +88,21 @@ class NewtonSystem {
   /// nothing if there is none.
   std::optional<Vector> falling(double curvature)
   {
+    const bool always = about.has_complete_factors();
     const double before = std::exchange(shift, curvature);
     std::optional<Vector> found;
-    if (about.n() > MANY || !is_positive()) {
+    if ((!always && about.n() > MANY) || !is_positive()) {
       incomplete = nullptr;
-      const Factors &near = approximate();
+      if (always) factorise();
+      const Factors &near = always ? *complete : approximate();
+      shift = curvature;  // the factors may have a larger one
       const Vector from = some_vector();
       const Iterated along = iterate(near, from, FALLING, from.size());
       if (along.end == Solved::FALLS) found = along.last;
     }
     shift = before;
-    incomplete = complete = nullptr;
+    incomplete = nullptr;
+    if (!always) complete = nullptr;
     return found;
   }
 
@@ -175,7 +179,7 @@ class NewtonSystem {
   {
     for (double added = shift; !incomplete && !(incomplete = factors_with(added));) {
       raise(added);
-      if (!about.has_complete_factors()) added = std::max(added, INCOMPLETE * scale);
+      added = std::max(added, INCOMPLETE * scale);
     }
     return *incomplete;
   }
