@@ -182,8 +182,9 @@ class LocalEnergyModel {
   /// (n,) for displacements the largest of their diagonal elements, for rotations that of theirs:
   /// nearly round particles rotate far more easily than they move.
   virtual Eigen::VectorXd largest_of_kind() const = 0;
-  /// Whether complete factors are always cheap.
-  virtual bool has_complete_factors() const = 0;
+  /// Complete where such factors are always cheap.
+  virtual Fill fill() const = 0;
+  bool has_complete_factors() const { return fill() == Fill::COMPLETE; }
   /// Factors of that Hessian plus a diagonal (n,); null if a pivot is not positive.
   virtual std::shared_ptr<Factors> factors(const Eigen::VectorXd &diagonal) = 0;
 
@@ -191,7 +192,7 @@ class LocalEnergyModel {
   /// null for non-finite matrices.
   std::shared_ptr<Factors> factorise(const Displacement &at, const Eigen::VectorXd &added)
   {
-    differentiate(at, has_complete_factors() ? Fill::COMPLETE : Fill::NONE);
+    differentiate(at, fill());
     const Eigen::VectorXd sum = diagonal() + added;
     if (!sum.allFinite()) return nullptr;
     const double smallest = sum.size() > 0 ? sum.minCoeff() : 1.0;
@@ -398,7 +399,10 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     return hessian->times(vector);
   }
 
-  bool has_complete_factors() const override { return fill() == Fill::COMPLETE; }
+  Fill fill() const override
+  {
+    return D == 2 || shapes.size() <= FEW ? Fill::COMPLETE : Fill::NONE;
+  }
 
   std::shared_ptr<Factors> factors(const Eigen::VectorXd &added) override
   {
@@ -479,8 +483,6 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   bool has_pairs() const { return moved.has_value(); }
 
   Team *team_for(std::size_t n) const { return n < MANY ? nullptr : team.get(); }
-
-  Fill fill() const { return D == 2 || shapes.size() <= FEW ? Fill::COMPLETE : Fill::NONE; }
 
   template <class S> LandscapeSums sums_of(const PairSums<D, S> &sums, const Displacement &at) const
   {

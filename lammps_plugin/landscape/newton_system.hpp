@@ -37,7 +37,7 @@ class NewtonSystem {
   /// positive.
   void prepare()
   {
-    differentiate(about.has_complete_factors() ? Fill::COMPLETE : Fill::NONE);
+    differentiate(about.fill());
     const double largest = about.n() > 0 ? about.diagonal().cwiseAbs().maxCoeff() : 0.0;
     if (!std::isfinite(largest))
       throw std::runtime_error("The Hessian has elements that are not finite.");
@@ -88,13 +88,13 @@ class NewtonSystem {
   /// nothing if there is none.
   std::optional<Vector> falling(double curvature)
   {
-    const bool always = about.has_complete_factors();
     const double before = std::exchange(shift, curvature);
+    const bool can_factorise = has_memory();
+    incomplete = nullptr;
     std::optional<Vector> found;
-    if ((!always && about.n() > MANY) || !is_positive()) {
-      incomplete = nullptr;
-      if (always) factorise();
-      const Factors &near = always ? *complete : approximate();
+    if (!can_factorise || !is_positive()) {
+      if (can_factorise) factorise();
+      const Factors &near = can_factorise ? *complete : approximate();
       shift = curvature;  // the factors may have a larger one
       const Vector from = some_vector();
       const Iterated along = iterate(near, from, FALLING, from.size());
@@ -102,7 +102,6 @@ class NewtonSystem {
     }
     shift = before;
     incomplete = nullptr;
-    if (!always) complete = nullptr;
     return found;
   }
 
@@ -140,17 +139,19 @@ class NewtonSystem {
   /// complete factors: 0.06 to 0.13 for 400 to 1000 spheres or spheroids. With more than MANY
   /// coordinates the memory of complete factors grows too large.
   static constexpr double FEW = 0.1;
-  static constexpr Eigen::Index MANY = 30000;
+  static constexpr std::size_t MANY = 30000;
 
   LocalEnergyModel &about;
   double scale = 1.0;
   std::shared_ptr<Factors> complete, incomplete;
   bool is_old = false, is_far = false;  // complete factors of an earlier base; too far from it
 
+  bool has_memory() const { return about.has_complete_factors() || about.n() <= MANY; }
+
   Eigen::Index few() const
   {
     const auto n = static_cast<Eigen::Index>(about.n());
-    return n > MANY ? n : static_cast<Eigen::Index>(FEW * n);
+    return has_memory() ? static_cast<Eigen::Index>(FEW * n) : n;
   }
 
   void differentiate(Fill fill)

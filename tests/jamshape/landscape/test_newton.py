@@ -8,6 +8,7 @@ from pressed import PRESSED, pressed_named
 from scenes import pressed
 from squeezed import squeezed
 
+import jamshape as js
 from jamshape import _contact
 from jamshape.landscape import Landscape, State
 from jamshape.landscape.local_energy_model import LocalEnergyModel
@@ -64,6 +65,16 @@ def test_solutions_are_as_good_as_asked_for_where_factors_would_fill():
         assert (np.einsum("ki,ki->k", right, found) > 0).all()
         spread.append(left.max())
     assert spread[0] > 1e-6  # it does no more than it is asked for
+
+
+def test_near_isostaticity_factors_take_over_from_iterations():
+    spheres = js.Superellipsoids(p=1, w1=1, w2=1)
+    packing = js.make_packing(spheres, n=160, seed=1, u0=1e-10, progress=False)
+    newton, curvature = equations(packing, 1e-9)
+    right = curvature.coupling[None]
+    found = newton.solve(right, 1e-3)
+    # Iterations would stop at the accuracy asked for.
+    assert remainders(newton, curvature.hessian, right, found).max() < 1e-8
 
 
 @pytest.mark.parametrize("name", [*PRESSED, MANY])
