@@ -230,7 +230,7 @@ class RunFile(Recorded):
         Warns
         -----
         NotReachedWarning
-            If minimisations of some frames did not finish.
+            If minimisations of some frames did not finish and an end of the bracket is unknown for that.
 
         Examples
         --------
@@ -242,7 +242,7 @@ class RunFile(Recorded):
         True
         """
         found = Jamming.stored(self.about) or self._minimised(progress=progress)
-        found.warn_if_undecided()
+        found.warn_if_not_found()
         return found
 
     def _minimised(self, *, progress: bool) -> Jamming:

@@ -116,13 +116,18 @@ class Jamming(NamedTuple):
             return f"{low} and no denser one stays jammed"
         return f"{low} and that at phi = {self.jams:.5f} stays jammed"
 
-    def warn_if_undecided(self) -> None:
-        """Warn if minimisations did not finish."""
-        if self.undecided:
-            said = (
-                f"{self.undecided} of {self.tried} minimised frames ended neither at rest nor without energy"
-                f" and are ignored: {self.text()}; record more {{frames:name}}"
-            )
+    def undecided_text(self) -> str:
+        """Describe the frames that are ignored."""
+        are = "is" if self.undecided == 1 else "are"
+        return (
+            f"{self.undecided} of {self.tried} minimised frames ended neither at rest nor without energy"
+            f" and {are} ignored"
+        )
+
+    def warn_if_not_found(self) -> None:
+        """Warn if an end of the bracket is unknown and minimisations did not finish."""
+        if self.undecided and math.isnan(self.phi_J):
+            said = f"{self.undecided_text()}: {self.text()}; record more {{frames:name}}"
             warnings.warn(NotReachedWarning(said, {"frames": None}), stacklevel=3)
 
     def differs(self, fit: OnsetFit) -> bool:
@@ -139,7 +144,8 @@ class Jamming(NamedTuple):
         >>> print(Jamming(0.855, 0.858).verdict(fit, 1e-6))
         phi_J(kappa = 1e-06) = 0.829 +- 0.003 is the onset of flow and not of jamming: minimised, the frame at phi = 0.85500 unjams and that at phi = 0.85800 stays jammed.
         """
-        told = f"minimised, {self.text()}."
+        ignored = f"; {self.undecided_text()}" if self.undecided else ""
+        told = f"minimised, {self.text()}{ignored}."
         if fit is None:
             return f"p(phi) has no onset; {told}"
         onset = f"phi_J(kappa = {kappa:g}) = {Mean(*fit[:2]).text()}"

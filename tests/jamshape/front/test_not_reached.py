@@ -45,18 +45,38 @@ def test_a_pressure_that_is_not_reached_is_said(start, tmp_path):
         js.slow_compress(start=start, **how)
 
 
-def test_frames_that_come_to_no_end_are_said(start, tmp_path, monkeypatch):
+IGNORED = "1 of 3 minimised frames ended neither at rest nor without energy and is ignored"
+
+
+@pytest.fixture
+def with_frames(start, tmp_path, monkeypatch):
+    """Make a run whose minimised frames stay jammed or not as told, the densest first."""
     how = {"phi": (None, 0.52), "kappa": 1e-3, "file": tmp_path / "slow.h5", "progress": False}
     run = js.slow_compress(start=start, **how)
-    tried = [Tried(2, 0.52, True), Tried(1, 0.51, None), Tried(0, 0.5, False)]
-    monkeypatch.setattr("jamshape.front.run.minimised_frames", lambda *_: iter(tried))
-    said = "1 of 3 minimised frames ended neither.* phi = 0.50000 unjams"
-    with pytest.warns(js.NotReachedWarning, match=said):
-        found = run.jamming(progress=False)
-    assert found == Jamming(0.5, 0.52, 3, 1)
-    with pytest.warns(js.NotReachedWarning, match=said):  # from the file
-        assert js.load(tmp_path / "slow.h5").jamming(progress=False) == found
+
+    def make(*stays):
+        tried = [Tried(2 - k, 0.52 - 0.01 * k, one) for k, one in enumerate(stays)]
+        monkeypatch.setattr("jamshape.front.run.minimised_frames", lambda *_: iter(tried))
+        return run
+
+    return make
+
+
+def test_frames_that_come_to_no_end_are_said_where_jamming_is_found(with_frames):
+    run = with_frames(True, None, False)
+    for again in (run, js.load(run.file)):
+        found = again.jamming(progress=False)
+        assert found == Jamming(0.5, 0.52, 3, 1)
+        assert found.verdict(None, 1e-3).endswith(f"at phi = 0.52000 stays jammed; {IGNORED}.")
     assert Jamming.stored(found.attributes()) == found
+
+
+@pytest.mark.parametrize("stays", [(None, False, False), (True, True, None)])
+def test_frames_that_come_to_no_end_warn_where_it_is_not_found(with_frames, stays):
+    run = with_frames(*stays)
+    for again in (run, js.load(run.file)):
+        with pytest.warns(js.NotReachedWarning, match=f"{IGNORED}: .*; record more frames"):
+            again.jamming(progress=False)
 
 
 def test_rows_of_a_quasistatic_shear_whose_forces_do_not_balance_are_said(tmp_path):
