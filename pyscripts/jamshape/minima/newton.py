@@ -7,7 +7,7 @@ import math
 from jamshape.landscape.local_energy_model import DescentStop, LocalEnergyModel
 from jamshape.landscape.newton import LONGEST_STEP, WIDEST_TURN, least_shift
 from jamshape.minima.descent import Descent, Outcome, rounding_of_a_bond
-from jamshape.minima.nonsmooth import at_rest
+from jamshape.minima.nonsmooth import relax
 
 # L-BFGS, cheap while contacts open and close, hands over to Newton's method below this residual.
 _NEWTON_BELOW = 1e-2
@@ -59,19 +59,15 @@ def _run(descent: Descent, newton_below: float, patience: int, *, is_near: bool 
     local_model = LocalEnergyModel(landscape, descent.state)
     end = local_model.descend(about, least_shift(landscape, descent.evaluation))
     descent.take(local_model.base, end)
-    return _on_a_corner(descent) or Outcome(end.outcome)
+    return _relaxed(descent) or Outcome(end.outcome)
 
 
-def _on_a_corner(descent: Descent) -> Outcome | None:
-    """Relax a state that oscillates across a kink onto it; None without a kink.
+def _relaxed(descent: Descent) -> Outcome | None:
+    """Relax a state that oscillates across a kink onto it; None if it does not come to rest.
 
     Forces between round particles are continuous.
     """
     is_wanted = descent.stop.kinks and descent.outcome() is None
     if not is_wanted or descent.landscape.particles.is_round.all():
         return None
-    found = at_rest(descent.landscape, descent.state, descent.stop.tolerance)
-    if found is None:
-        return None
-    descent.move_to(found.state, found.evaluation)
-    return Outcome.KINK if found.n_sides > 1 else Outcome.CONVERGED
+    return relax(descent)

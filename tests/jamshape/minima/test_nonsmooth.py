@@ -1,18 +1,19 @@
 """States at rest on corners of the energy, where no side has forces that are zero but a mixture of them is."""
 
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import scipy.optimize
 from chosen_seeds import chosen_by_seed
 from mixtures import bidisperse
 
 import jamshape as js
 from jamshape.files.h5md import read_attributes, read_packing
-from jamshape.landscape import Evaluation, Landscape, State
+from jamshape.landscape import Landscape, State
 from jamshape.minima import Outcome, Stop, minimise, residual_of
-from jamshape.minima.nonsmooth import at_rest, weights_of
+from jamshape.minima.descent import Descent
+from jamshape.minima.nonsmooth import relax
 from jamshape.protocols.random_start import random_packing
 
 TOLERANCE = 1e-8
@@ -98,88 +99,47 @@ def test_a_smooth_minimum_has_one_side(tmp_path):
     overlap = landscape.evaluate(state).bond_force * landscape.length**2
     rng = np.random.default_rng(3)
     near = landscape.displaced(state, 1e-4 * overlap * rng.normal(size=landscape.size))
-    found = at_rest(landscape, near, TOLERANCE)
-    assert found.n_sides == 1
-    assert residual_of(landscape, landscape.evaluate(found.state)).largest <= TOLERANCE
-
-
-class Folded:
-    """A quadratic form with kinks across planes through 0, where it is least; the curvature jumps at each."""
-
-    length, stiffness, bond_force = 1.0, 1.0, 1e-3
-
-    def __init__(self, kinks, seed, size=60):
-        rng = np.random.default_rng(seed)
-        half = rng.normal(size=(size, size))
-        self.smooth = half @ half.T / size + 0.1 * np.eye(size)
-        self.normals = rng.normal(size=(kinks, size))
-        self.normals /= np.linalg.norm(self.normals, axis=1)[:, None]
-        self.jumps = self.bond_force * 10 ** rng.uniform(-2, -1, kinks)
-        self.pull = (self.jumps * rng.uniform(-0.8, 0.8, kinks)) @ self.normals
-        self.bend = rng.uniform(0, 0.5, kinks)
-        self.size, self.law = size, SimpleNamespace(overlap_over_harmonic=lambda _: 1.0)
-
-    def displaced(self, x, step):
-        return x + step
-
-    def evaluate(self, x):
-        across, Hx = self.normals @ x, self.smooth @ x
-        over = np.maximum(across, 0)
-        energy = x @ Hx / 2 - self.pull @ x + self.jumps @ np.abs(across) + self.bend @ over**2 / 2
-        force = (self.jumps * np.where(across > 0, 1, -1) + self.bend * over) @ self.normals
-        return Evaluation(energy + 1e-7, Hx - self.pull + force, None, self.bond_force, 1, None)
-
-    def curvature(self, x):
-        bent = self.bend * (self.normals @ x > 0)
-        return SimpleNamespace(hessian=self.smooth + (self.normals.T * bent) @ self.normals)
-
-    def newton_at(self, x):
-        inverse = np.linalg.inv(self.curvature(x).hessian)
-        return SimpleNamespace(
-            shift=0.0, prepare=lambda: None, solve=lambda gradients, _: gradients @ inverse
-        )
-
-
-@pytest.mark.parametrize("kinks", range(1, 6))
-def test_kinks_that_meet_are_found_together(kinks, monkeypatch):
-    """Their minimum is at 0 by construction; every side of it pulls there."""
-    part, folded = "jamshape.minima.nonsmooth.", Folded(kinks, seed=0)
-    monkeypatch.setattr(
-        part + "LocalEnergyModel",
-        lambda _, x: SimpleNamespace(
-            newton=lambda _: folded.newton_at(x),
-            evaluate=lambda step, *_, **__: folded.evaluate(x + step),
-        ),
-    )
-    monkeypatch.setattr(part + "least_shift", lambda *_: 0.0)
-    monkeypatch.setattr(
-        part + "residual_of",
-        lambda _, at: SimpleNamespace(largest=np.abs(at.gradient).max() / at.bond_force),
-    )
-    start = 1e-5 * np.random.default_rng(9).normal(size=folded.size)
-    found = at_rest(folded, start, TOLERANCE)
-    assert found.n_sides > kinks
-    assert np.abs(found.state).max() < 1e-9 * folded.bond_force
-    assert np.abs(folded.evaluate(found.state).gradient).max() > 1e-3 * folded.bond_force
+    descent = Descent(landscape, near, Stop(TOLERANCE))
+    assert relax(descent) is Outcome.CONVERGED
+    assert residual_of(landscape, landscape.evaluate(descent.state)).largest <= TOLERANCE
 
 
 def test_where_nothing_touches_there_is_no_corner():
     apart = random_packing(4, 0.1, 1, bidisperse(1.0))
-    assert at_rest(Landscape(apart), State.of(apart), TOLERANCE) is None
+    descent = Descent(Landscape(apart), State.of(apart), Stop(TOLERANCE))
+    assert relax(descent) is Outcome.UNJAMMED
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_weights_are_those_of_a_search_over_all(seed):
-    rng = np.random.default_rng(seed)
-    k = 3
-    half = rng.normal(size=(k, k))
-    products, below = half @ half.T, rng.uniform(0, 0.3, k)
-    found = weights_of(products, below)
-    assert found.min() >= 0
-    assert found.sum() == pytest.approx(1)
-    grid = np.linspace(0, 1, 201)
-    a, b = (part.ravel() for part in np.meshgrid(grid, grid))
-    inside = a + b <= 1
-    tried = np.column_stack([a, b, 1 - a - b])[inside]
-    values = np.einsum("ti,ij,tj->t", tried, products, tried) / 2 + tried @ below
-    assert found @ products @ found / 2 + found @ below <= values.min() + 1e-12
+def combined(landscape, state, distance):
+    """The least residual of a convex combination of the forces on all sides of a state, found by trying many."""
+    rng, here = np.random.default_rng(0), landscape.evaluate(state)
+    ways = rng.normal(size=(100, landscape.size))
+    ways *= distance / np.abs(ways).max(axis=1)[:, None]
+    sides = [
+        landscape.evaluate(landscape.displaced(state, way)).gradient for way in (*ways, *-ways)
+    ]
+    forces = np.array(sides) / here.bond_force
+    sum_is_one = 1e3  # a weight in the least squares
+    rows = np.vstack([forces.T, np.full(len(forces), sum_is_one)])
+    weights, _ = scipy.optimize.nnls(rows, np.append(np.zeros(landscape.size), sum_is_one))
+    mixture = weights @ forces / weights.sum() * here.bond_force
+    return residual_of(landscape, here._replace(gradient=mixture)).largest
+
+
+@pytest.mark.parametrize(
+    ("alpha", "n", "seed", "u0"),
+    [(4, 32, 7, 1e-9), (4, 64, 16, 1e-9), (4, 64, 8, 1e-7), (0.01, 64, 16, 1e-9)],
+)
+def test_rods_that_slide_along_kinks_come_to_rest(alpha, n, seed, u0):
+    """Most of these packings are on a kink; which ones depends on the processor, but not that all are at rest."""
+    rods = js.Spherocylinders(alpha=alpha)
+    packing = js.make_packing(rods, n=n, seed=seed, u0=u0, progress=False)
+    assert packing.results["outcome"] in ("converged", "kink")
+    landscape, state = Landscape(packing), State.of(packing)
+    here = landscape.evaluate(state)
+    if packing.results["outcome"] == "converged":
+        assert residual_of(landscape, here).largest <= TOLERANCE
+        return
+    overlap = here.bond_force * landscape.length**2
+    least = min(combined(landscape, state, overlap * near) for near in (1e-6, 1e-7, 1e-8))
+    assert least < 0.05 * residual_of(landscape, here).largest
