@@ -40,25 +40,15 @@ EXTREMES = {
 }
 
 
-# Torques of 1e-6 of a force times the radius turn round within 1e-7 of a turn where a tip takes over from the other:
-# forces are balanced, torques to 1e-7 of force times radius, half of what they are at most.
-STIFF_TIPS = pytest.mark.xfail(
-    reason="alpha 1e-6 ends stalled, its torques unbalanced", strict=False
-)
-CASES = [
-    pytest.param(name, marks=[STIFF_TIPS] if name == "alpha 1e-6" else []) for name in EXTREMES
-]
-
-
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", EXTREMES)
 def test_packing_reaches_its_energy_in_equilibrium(name, tmp_path):
     sample, out = replace(SMALL, **EXTREMES[name]), tmp_path / "packing.h5"
     make(sample, out)
     found, packing = read_attributes(out), read_packing(out)
     print(name, {k: found[k] for k in ("outcome", "phi", "z", "residual", "rounding_floor")})
     assert found["u"] == pytest.approx(sample.target.u0, rel=1e-7, abs=0)
-    assert found["outcome"] in {"converged", "sliding"}
-    assert found["residual"] < (1e-8 if found["outcome"] == "converged" else 1e-6)
+    assert found["outcome"] in {"converged", "kink", "sliding"}
+    assert found["residual"] < (1e-6 if found["outcome"] == "sliding" else 1e-8)
     assert found["rounding_floor"] < 1e-8
     assert 3 <= found["z"] < 6.5
     if "longer" in name:
