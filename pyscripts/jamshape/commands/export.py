@@ -56,8 +56,8 @@ def _write_session(path: Path, packings: Sequence[Packing]) -> None:
 
 
 def _write_h5(path: Path, packings: Sequence[Packing]) -> None:
-    first, *others = packings
-    if others:
+    first = packings[0]
+    if len(packings) > 1:
         write_run(path, packings, first.to_store)
     else:
         write_packing(path, first, first.to_store)

@@ -98,8 +98,8 @@ class Content:
     @classmethod
     def of(cls, path: Path, file: h5py.File) -> Content:
         """Read an open file of any format version, without a checkpoint."""
-        n_frames = layout.count(file, "particles/all/position")
-        frames = [layout.read_frame(file, k) for k in range(n_frames)]
+        reader = layout.FrameReader(file)
+        frames = [reader.read(k) for k in range(reader.n_frames)]
         found = cls(path, frames, attributes(file, "parameters"))
         for name in require_item(file, "observables"):
             steps, times, values = layout.read_rows(file, name)

@@ -202,17 +202,15 @@ def read_packing(path: PathLike, frame: int = -1) -> Packing:
         If the file cannot be opened.
     """
     with layout.opened(path) as file:
-        n_frames = layout.count(file, "particles/all/position")
-        return layout.read_frame(file, row_of(frame, n_frames, path))
+        reader = layout.FrameReader(file)
+        return reader.read(row_of(frame, reader.n_frames, path))
 
 
 def read_packings(path: PathLike, frames: Sequence[int]) -> list[Packing]:
     """Read some frames, counted from 0; errors as `read_packing`."""
     with layout.opened(path) as file:
-        n_frames = layout.count(file, "particles/all/position")
-        held: list[Any] = []  # open datasets keep their chunks in memory
-        require_item(file, "particles/all").visititems(lambda _, item: held.append(item))
-        return [layout.read_frame(file, row_of(frame, n_frames, path)) for frame in frames]
+        reader = layout.FrameReader(file)
+        return [reader.read(row_of(frame, reader.n_frames, path)) for frame in frames]
 
 
 def read_clock(path: PathLike) -> tuple[IntArray, FloatArray]:

@@ -234,58 +234,86 @@ def _read_law(file: h5py.File) -> Interaction:
         raise FileFormatError(msg) from error
 
 
-def read_frame(file: h5py.File, frame: int) -> Packing:
-    """Read a frame as a packing."""
-    n_frames = count(file, "particles/all/position")
-    n = math.prod(require_dataset(file, "particles/all/species").shape[:1])
+class FrameReader:
+    """Reader of the frames of an open file as packings; what they share is looked up and checked once.
 
-    def row(name: str, *, sparse: bool = False) -> Any:
-        element, dataset = f"particles/all/{name}".rsplit("/", 1)
-        rows = require_rows(file, element, dataset, n_frames, sparse=sparse)
-        _require_most(rows, rows.shape[1:], n)
-        return rows[frame]
+    Open datasets also keep their chunks in memory, which rows share.
+    """
 
-    def fixed(name: str, most: int = _MOST_COLUMNS) -> Any:
-        values = require_dataset(file, f"particles/all/{name}")
-        _require_most(values, values.shape, n, most)
+    def __init__(self, file: h5py.File) -> None:
+        self.file = file
+        self.n_frames = count(file, "particles/all/position")
+        self.n = math.prod(require_dataset(file, "particles/all/species").shape[:1])
+        self._rows: dict[str, Any] = {}
+        self._shared = self._read_shared()
+        self._columns = self._find_columns()
+        self._is_size_known = False
+
+    def read(self, frame: int) -> Packing:
+        """Read a frame, counted from 0."""
+        fields, file = dict(self._shared), self.file
+        for name in ("position", "orientation", "image"):
+            fields[name] = self._row(f"{name}/value", frame)
+        for name, element in RESTS.items():
+            if self._has(element):
+                whole = fields[name.removesuffix("_rest")]
+                fields[name] = as_rest(self._row(f"{element}/value", frame, sparse=True), whole)
+        fields["columns"] = {k: column_of(rows[frame]) for k, rows in self._columns.items()}
+        fields["step"] = int(self._row("position/step", frame))
+        fields["time"] = float(self._row("position/time", frame))
+        lo, edges = self._row("box/lo/value", frame), self._row(f"{EDGES}/value", frame)
+        try:
+            if self._has(EDGES_REST):
+                rest = lengths_of(
+                    as_rest(self._row(f"{EDGES_REST}/value", frame, sparse=True), edges)
+                )
+                fields |= {"edges_rest": rest.edges, "tilt_rest": rest.tilt}
+            packing = Packing(box=Box(lo, *lengths_of(edges)), **fields)
+        except ValueError as error:
+            msg = f"{file.filename}: {error}; write it again"
+            raise FileFormatError(msg) from error
+        if not self._is_size_known:
+            _require_one_size(file, packing)
+            self._is_size_known = True
+        return packing
+
+    def _has(self, element: str) -> bool:
+        name = f"{element}/value"
+        return name in self._rows or has_item(self.file, f"particles/all/{element}")
+
+    def _row(self, name: str, frame: int, *, sparse: bool = False) -> Any:
+        if name not in self._rows:
+            element, dataset = f"particles/all/{name}".rsplit("/", 1)
+            rows = require_rows(self.file, element, dataset, self.n_frames, sparse=sparse)
+            _require_most(rows, rows.shape[1:], self.n)
+            self._rows[name] = rows
+        return self._rows[name][frame]
+
+    def _read_shared(self) -> dict[str, Any]:
+        """Read what all frames share."""
+        found = {name: self._fixed(name) for name in ("diameters", "species", "id")}
+        for name, most in (("exponent", 1), ("form", MOST_NUMBERS)):
+            if has_item(self.file, f"particles/all/{name}"):
+                found[name] = self._fixed(name, most)
+        style = attribute(require_item(self.file, "particles/all"), "shape_style")
+        return found | {"shape_style": style, "law": _read_law(self.file)}
+
+    def _fixed(self, name: str, most: int | None = None) -> Any:
+        values = require_dataset(self.file, f"particles/all/{name}")
+        _require_most(values, values.shape, self.n, _MOST_COLUMNS if most is None else most)
         return values[()]
 
-    fields = {name: fixed(name) for name in ("diameters", "species", "id")}
-    for name, most in (("exponent", 1), ("form", MOST_NUMBERS)):
-        if has_item(file, f"particles/all/{name}"):
-            fields[name] = fixed(name, most)
-    fields |= {name: row(f"{name}/value") for name in ("position", "orientation", "image")}
-    for name, element in RESTS.items():
-        if has_item(file, f"particles/all/{element}"):
-            whole = fields[name.removesuffix("_rest")]
-            fields[name] = as_rest(row(f"{element}/value", sparse=True), whole)
-    fields["columns"] = _read_columns(file, frame, n)
-    fields["shape_style"] = attribute(require_item(file, "particles/all"), "shape_style")
-    fields["law"] = _read_law(file)
-    fields["step"], fields["time"] = int(row("position/step")), float(row("position/time"))
-    lo, edges = row("box/lo/value"), row(f"{EDGES}/value")
-    try:
-        if has_item(file, f"particles/all/{EDGES_REST}"):
-            rest = lengths_of(as_rest(row(f"{EDGES_REST}/value", sparse=True), edges))
-            fields |= {"edges_rest": rest.edges, "tilt_rest": rest.tilt}
-        packing = Packing(box=Box(lo, *lengths_of(edges)), **fields)
-    except ValueError as error:
-        msg = f"{file.filename}: {error}; write it again"
-        raise FileFormatError(msg) from error
-    _require_one_size(file, packing)
-    return packing
-
-
-def _read_columns(file: h5py.File, frame: int, n: int) -> dict[str, NDArray[Any]]:
-    """Read the other columns of the particles."""
-    group, found = f"particles/all/{COLUMNS}", {}
-    for name in require_item(file, group) if has_item(file, group) else ():
-        values = require_dataset(file, f"{group}/{name}/value", kinds="biufS")
-        if values.shape[1:2] != (n,) or frame >= len(values) or math.prod(values.shape[2:]) > MOST:
-            msg = f"{file.filename}: /{group}/{name} has shape {values.shape}, expected rows of {n} particles"
-            raise FileFormatError(msg)
-        found[name] = column_of(values[frame])
-    return found
+    def _find_columns(self) -> dict[str, Any]:
+        """Look up the other columns of the particles."""
+        group, found = f"particles/all/{COLUMNS}", {}
+        for name in require_item(self.file, group) if has_item(self.file, group) else ():
+            rows = require_dataset(self.file, f"{group}/{name}/value", kinds="biufS")
+            shape, needed = rows.shape, (self.n_frames, self.n)
+            if shape[:1] < needed[:1] or shape[1:2] != needed[1:] or math.prod(shape[2:]) > MOST:
+                msg = f"{self.file.filename}: /{group}/{name} has shape {shape}, expected rows of {self.n} particles"
+                raise FileFormatError(msg)
+            found[name] = rows
+        return found
 
 
 _MOST_COLUMNS = 4  # numbers of a particle in one array, or of a row of a box

@@ -7,8 +7,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import scipy.sparse
-from scipy.sparse.linalg import LinearOperator
+import scipy  # loads its parts once they are used
 
 from jamshape.arguments import checked
 from jamshape.arrays import FloatArray, IntArray
@@ -170,7 +169,7 @@ class Energy(Record):
         return float(largest / bonds.mean()) if len(bonds) else 0.0
 
     @cached_property
-    def hessian_product(self) -> LinearOperator:
+    def hessian_product(self) -> scipy.sparse.linalg.LinearOperator:
         """(c, c) `scipy.sparse.linalg.LinearOperator` that multiplies the Hessian by a vector, without assembling it.
 
         Errors are those of `jamshape.energy`.

@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.sparse
+import scipy  # loads its parts once they are used
 from numpy.typing import ArrayLike, NDArray
 
 from jamshape.arrays import BoolArray, FloatArray, IntArray

@@ -26,7 +26,7 @@ _MOST = 32
 
 _TOLERANCE = 1e-8  # residual at which minimisations stop, that of packings
 _LOWEST = 1e-16  # energy density likewise, in units of k_e and length, of harmonic contacts some 1e-8 above phi_J
-_EVALUATIONS = 20_000
+_EVALUATIONS = 100_000
 
 _VERDICTS = {
     Outcome.UNJAMMED: False,

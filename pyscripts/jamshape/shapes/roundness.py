@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import scipy  # loads scipy.special only once it is used
+import scipy  # loads its parts once they are used
 from numpy.typing import ArrayLike
 
 from jamshape.arrays import FloatArray

@@ -10,9 +10,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.linalg
+import scipy  # loads its parts once they are used
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from jamshape.arrays import FloatArray, LongArray
 from jamshape.vibration.extended import dense_product
@@ -211,7 +210,7 @@ def _are_close(off: LongArray, gap: LongArray) -> NDArray[np.bool_]:
 def _turn_together(F: LongArray, G: LongArray, close: NDArray[np.bool_]) -> LongArray:
     """Diagonalise the blocks of close modes, in doubles."""
     turn = np.eye(len(F), dtype=np.longdouble)
-    n_groups, group = connected_components(close, directed=False)
+    n_groups, group = scipy.sparse.csgraph.connected_components(close, directed=False)
     for g in np.flatnonzero(np.bincount(group, minlength=n_groups) > 1):
         rows = np.flatnonzero(group == g)
         block = np.ix_(rows, rows)

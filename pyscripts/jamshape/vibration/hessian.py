@@ -13,10 +13,8 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.sparse
+import scipy  # loads its parts once they are used
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import LinearOperator
 
 from jamshape.arrays import FloatArray, IntArray, LongArray
 from jamshape.landscape import Evaluation, Landscape, State, contracted
@@ -222,7 +220,7 @@ class DynamicalMatrix(Record):
         first, second = np.searchsorted(backbone, self.bonds.particles.T)
         n = len(backbone)
         graph = scipy.sparse.coo_matrix((np.ones(len(first)), (first, second)), shape=(n, n))
-        n_clusters, cluster = connected_components(graph, directed=False)
+        n_clusters, cluster = scipy.sparse.csgraph.connected_components(graph, directed=False)
         own = cluster[np.searchsorted(backbone, self.coordinates.particle)]
         moves = ~self.coordinates.is_rotation
         columns = np.zeros((self.size, D * n_clusters))
@@ -387,7 +385,9 @@ def all_coordinates(landscape: Landscape, rotation: str | FloatArray = "radian")
     return Coordinates(particle, kind, direction, len(lengths), D)
 
 
-def hessian_product(landscape: Landscape, state: State, coordinates: Coordinates) -> LinearOperator:
+def hessian_product(
+    landscape: Landscape, state: State, coordinates: Coordinates
+) -> scipy.sparse.linalg.LinearOperator:
     """Return the product of the Hessian with vectors, summed over contacts without assembling a matrix.
 
     Errors are those of `Landscape.evaluate`.
@@ -400,7 +400,9 @@ def hessian_product(landscape: Landscape, state: State, coordinates: Coordinates
         return scatter.vector(np.einsum("cij,cj->ci", blocks, moved))
 
     n = coordinates.size
-    return LinearOperator((n, n), matvec=product, rmatvec=product, dtype=np.float64)
+    return scipy.sparse.linalg.LinearOperator(
+        (n, n), matvec=product, rmatvec=product, dtype=np.float64
+    )
 
 
 class BondLengths(NamedTuple):

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import scipy.sparse
+import scipy  # loads its parts once they are used
 
 from jamshape.arrays import FloatArray
 from jamshape.landscape import CrossingError, Landscape, State

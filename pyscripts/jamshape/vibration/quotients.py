@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy  # loads its parts once they are used
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from jamshape.arrays import FloatArray, IntArray, LongArray
 from jamshape.vibration.extended import EPS as LONG_EPS
@@ -137,7 +137,9 @@ def grouped_error(values: FloatArray, pull: FloatArray, others: FloatArray) -> F
     """
     radius = np.sqrt((pull**2).sum(axis=0))
     distance = np.abs(values[:, None] - values)
-    _, group = connected_components(CLOSE * distance <= np.maximum(pull, pull.T), directed=False)
+    _, group = scipy.sparse.csgraph.connected_components(
+        CLOSE * distance <= np.maximum(pull, pull.T), directed=False
+    )
     same, squares = group[:, None] == group, pull**2
     away = np.where(same, np.inf, distance - radius[:, None]).min(axis=0, initial=np.inf)
     gap = _least_of_group(np.minimum(away, _distance_to(others, values)), group)

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import scipy  # loads scipy.optimize, which takes a quarter of a second, only once it is used
-import scipy.sparse
+import scipy  # loads its parts once they are used
 
 from jamshape.arrays import BoolArray, FloatArray, IntArray
 from jamshape.landscape import Landscape, State

@@ -17,9 +17,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.linalg
-import scipy.sparse
-from scipy.sparse.linalg import LinearOperator, eigsh, splu
+import scipy  # loads its parts once they are used
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.vibration.hessian import DynamicalMatrix
@@ -75,7 +73,7 @@ class ShiftedInverse:
             held[_supports(matrix.translations, floppy)] = -self.scale
         one = scipy.sparse.identity(C.shape[0])
         blocks = [[-(S + scipy.sparse.diags(held)) / self.scale, C.T], [C, -self.scale * one]]
-        self._factors = splu(scipy.sparse.bmat(blocks, format="csc"))
+        self._factors = scipy.sparse.linalg.splu(scipy.sparse.bmat(blocks, format="csc"))
 
     def solve(self, b: FloatArray) -> Solution:
         """Solve for (n, k) or (n,) right-hand sides, without net force on any cluster if shift is 0."""
@@ -226,10 +224,12 @@ def _near(matrix: DynamicalMatrix, k: int, shift: float, known: FloatArray) -> S
     def apply(b: FloatArray) -> FloatArray:
         return _without(known, inverse.solve(_without(known, b)).v)
 
-    operator = LinearOperator((matrix.size,) * 2, matvec=apply, dtype=np.float64)
+    operator = scipy.sparse.linalg.LinearOperator(
+        (matrix.size,) * 2, matvec=apply, dtype=np.float64
+    )
     start = _without(known, np.random.default_rng(0).normal(size=matrix.size))
     count = min(matrix.size - 1, max(2 * k + 1, k + 40))
-    v = eigsh(operator, k, which="LM", v0=start, ncv=count, tol=0.0)[1]
+    v = scipy.sparse.linalg.eigsh(operator, k, which="LM", v0=start, ncv=count, tol=0.0)[1]
     return _bounded(inverse, _without(known, v), time.perf_counter() - began)
 
 

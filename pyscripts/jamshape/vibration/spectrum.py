@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.linalg
+import scipy  # loads its parts once they are used
 from numpy.typing import NDArray
 
 from jamshape.arrays import FloatArray

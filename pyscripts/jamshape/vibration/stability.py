@@ -19,7 +19,7 @@ from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.sparse
+import scipy  # loads its parts once they are used
 
 from jamshape.arrays import FloatArray
 from jamshape.landscape import Landscape, State

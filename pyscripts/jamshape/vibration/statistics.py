@@ -8,10 +8,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.linalg
-import scipy.sparse
-from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu, svds
+import scipy  # loads its parts once they are used
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.contacts.rattlers import GRAZING
@@ -267,11 +264,11 @@ def _counted(weighted: Any, residual: float) -> int:
     """Count the eigenvalues of C C^T (or C^T C) above the squared tolerance, without computing any but the largest."""
     wide = weighted if weighted.shape[0] <= weighted.shape[1] else weighted.T
     first = np.random.default_rng(0).normal(size=wide.shape[0])  # the same result each time
-    largest = float(svds(wide, k=1, v0=first, return_singular_vectors=False)[0])
+    largest = float(scipy.sparse.linalg.svds(wide, k=1, v0=first, return_singular_vectors=False)[0])
     shift = (rank_tolerance(residual) * largest) ** 2
     shifted = (wide @ wide.T - shift * scipy.sparse.identity(wide.shape[0])).tocsc()
     how = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0}
-    factors = splu(shifted, **how, options={"SymmetricMode": True})
+    factors = scipy.sparse.linalg.splu(shifted, **how, options={"SymmetricMode": True})
     if not np.array_equal(factors.perm_r, factors.perm_c):
         msg = (
             f"the rank of {weighted.shape[0]} bonds is not determined by pivots, expected all of them on the diagonal;"
@@ -406,7 +403,7 @@ def _grouped(matrix: DynamicalMatrix, states: FloatArray) -> list[Redundancy]:
     graph = np.zeros((len(involved), matrix.coordinates.n_all), bool)
     graph[np.arange(len(involved))[:, None], particles] = True
     shared = graph.astype(np.int64) @ graph.T > 0
-    n_groups, group = connected_components(shared, directed=False)
+    n_groups, group = scipy.sparse.csgraph.connected_components(shared, directed=False)
     return [_redundancy(matrix, states, involved[group == g]) for g in range(n_groups)]
 
 

@@ -26,7 +26,7 @@ from jamshape.checks import require_one_of
 from jamshape.files import hdf5
 from jamshape.files.disk import PathLike
 from jamshape.files.hdf5 import FileFormatError
-from jamshape.files.layout import read_frame, version, write_particles
+from jamshape.files.layout import FrameReader, version, write_particles
 from jamshape.files.vocabulary import FORMAT_VERSION, require_format
 from jamshape.landscape import Landscape, State
 from jamshape.packing import Packing
@@ -349,7 +349,7 @@ def read_modes(path: PathLike) -> ModeTable:
 def read_moved(path: PathLike) -> Packing | None:
     """Read the packing beside eigenvectors; None where there is none. Errors as `read_modes`."""
     with hdf5.reading(path) as file:
-        return read_frame(file, 0) if hdf5.has_item(file, "particles/all") else None
+        return FrameReader(file).read(0) if hdf5.has_item(file, "particles/all") else None
 
 
 def holds_modes(path: PathLike) -> bool:
