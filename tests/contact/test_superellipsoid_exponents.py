@@ -130,10 +130,11 @@ def test_bounds_meet_of_needles_and_plates(of_i, measured):
     assert np.all(gap < 1e-12)
 
 
+@pytest.mark.parametrize("size", [3, pytest.param(10, marks=pytest.mark.validate)])
 @pytest.mark.parametrize("of_i", RANGES)
-def test_scale_is_that_of_an_independent_optimiser(of_i, measured):
+def test_scale_is_that_of_an_independent_optimiser(of_i, size, measured):
     """A simplex, from the line of centres, cannot end above the largest lower bound nor far below it."""
-    pairs = random_of(5, 10, RANGES[of_i], RANGES["any"])
+    pairs = random_of(5, size, RANGES[of_i], RANGES["any"])
     found = _contact.superellipsoid_scales(*pairs.rows)
     misses = []
     for k, eta in enumerate(found["eta"]):
@@ -169,7 +170,7 @@ def test_equal_exponents_are_p_to_the_last_bit(p):
             np.testing.assert_array_equal(values, function(*two)[name], err_msg=name)
 
 
-def along_axes(n_i, n_j, axis, size=40):
+def along_axes(n_i, n_j, axis, size=8):
     """Bodies one behind the other along one of their axes."""
     rng = np.random.default_rng(8)
     still = np.tile([1.0, 0, 0, 0], (size, 1))

@@ -24,8 +24,8 @@ EVERY = ((f"{RECORDER}.PAUSE", 0.0), (f"{RECORDER}.SECONDS", 0.0))
 NONE = ((f"{RECORDER}.PAUSE", 1e9), (f"{RECORDER}.SECONDS", 1e9))
 """No checkpoint before the end."""
 SHORT = (
-    ("jamshape.flow.implicit_driver.STEPS_PER_MARK", 20),
-    ("jamshape.flow.lammps_driver.EVALUATIONS_PER_MARK", 100),
+    ("jamshape.flow.implicit_driver.STEPS_PER_MARK", 40),
+    ("jamshape.flow.lammps_driver.EVALUATIONS_PER_MARK", 250),
 )
 """Marks close to each other."""
 FAR = (

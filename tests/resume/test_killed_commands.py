@@ -127,7 +127,7 @@ CASES = {
         given={"packing.h5": one_of_rods},
     ),
     "sweep": Case(
-        ("sweep", "--alpha", 0, 1, *DYNAMICS[2:], "--samples", 1, "--jobs", 2),
+        ("sweep", "--alpha", 0, 1, *PACK[2:], "--samples", 1, "--jobs", 2),
         tuple(f"alpha{alpha}_seed1.h5" for alpha in (0, 1)),
     ),
     # These write at their end, or begin anew.

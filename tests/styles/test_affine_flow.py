@@ -280,7 +280,7 @@ def before_flip(packings, tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize("ranks", [2, 4])
+@pytest.mark.parametrize("ranks", [2, pytest.param(4, marks=pytest.mark.validate)])
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_ranks_and_newton_change_nothing_across_flips(
     dimension, ranks, before_flip, tmp_path, measured
