@@ -24,7 +24,7 @@ from jamshape.landscape.local_energy_model import (
     StageKinks,
     Units,
 )
-from jamshape.minima.descent import Descent, Outcome, residual_of, rounding_floor
+from jamshape.minima.descent import Descent, Outcome, residual_of
 
 # Drag coefficient over the time of the first step, of the longest and of the shortest one, over the stiffness of a bond.
 _FIRST, _LEAST, _MOST = 1e-3, 1e-12, 1.0
@@ -35,8 +35,7 @@ _LONGER, _SHORTER = 0.25, 8.0
 # Largest number of steps: 5 to 60 bring rods to rest that are at least 1e-5 above jamming.
 _STEPS = 200
 
-# Accuracy of steps over the tolerance. Long doubles serve where rounding of doubles exceeds this fraction of it.
-_ACCURACY, _ROUNDING = 0.1, 0.1
+_ACCURACY = 0.1  # of steps over the tolerance
 
 _RISE = 1e-9  # an energy that rises by more than this fraction is that of another minimum
 
@@ -85,16 +84,15 @@ def _step(
     descent: Descent, local_model: LocalEnergyModel, pull: FloatArray, kinks: StageKinks
 ) -> Solution | None:
     """Solve an implicit step, and evaluate its end; None without a solution."""
-    here, landscape = descent.evaluation, descent.landscape
     accuracy, still = _ACCURACY * descent.stop.tolerance, np.zeros_like(pull)
-    rounding = rounding_floor(here, landscape, extended=False)
-    stage = Stage(pull, still, (still, still), rounding > _ROUNDING * accuracy)
+    # Doubles do not tell on which side of a kink a point close to it is.
+    stage = Stage(pull, still, (still, still), extended=True)
     try:
         found = local_model.solve(stage, kinks, _units(descent), accuracy)
         there = local_model.evaluate(found.x, 0.0, extended=True)
     except (CrossingError, RuntimeError):  # or second derivatives that jump, as for flat faces
         return None
-    rises = there.energy > (1 + _RISE) * here.energy
+    rises = there.energy > (1 + _RISE) * descent.evaluation.energy
     return found._replace(evaluation=there) if found.solved and not rises else None
 
 

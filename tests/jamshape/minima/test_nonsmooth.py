@@ -143,3 +143,12 @@ def test_rods_that_slide_along_kinks_come_to_rest(alpha, n, seed, u0):
     overlap = here.bond_force * landscape.length**2
     least = min(combined(landscape, state, overlap * near) for near in (1e-6, 1e-7, 1e-8))
     assert least < 0.05 * residual_of(landscape, here).largest
+
+
+@pytest.mark.parametrize("alpha", [0.01, 4])
+def test_rods_are_at_rest_after_each_step_of_a_shear(alpha):
+    """On a kink in some of its rows if they are nearly round."""
+    rods = js.Spherocylinders(alpha=alpha)
+    start = js.make_packing(rods, n=64, seed=1, u0=1e-7, progress=False)
+    run = js.quasistatic_shear(start=start, step=1e-3, strain=0.02, progress=False)
+    assert run.at_rest.all()
