@@ -158,6 +158,58 @@ template <int D, class S> void name_corner(Contact<D, S, 2> &contact)
   contact.kind = is_on_side ? ContactKind::TIP_TO_SIDE : ContactKind::TIP_TO_TIP;
 }
 
+/// The contact of the two sides with the largest energy, about their middles.
+template <int D, class T> struct LargestOfSides {
+  Contact<D, T, 2> contact = without_bonds<D, T, 2>(ContactStatus::APART);
+  int side_i = 0, side_j = 0;
+
+  LargestOfSides(const SpheropolygonBody<D, T> &i, const SpheropolygonBody<D, T> &j,
+                 const SpherocylinderLaw &law)
+  {
+    const double R_i = i.radius(), R_j = j.radius();
+    const auto compare = [&](int a, int b, const SpinePair<D, T> &spines) {
+      const Contact<D, T, 2> found = SpherocylinderContact<D, T>(spines, R_i, R_j, law).evaluate();
+      if (found.status == ContactStatus::CROSSING) {
+        contact = found;
+        return false;
+      }
+      if (!(found.energy > contact.energy)) return true;
+      contact = found;
+      side_i = a;
+      side_j = b;
+      return true;
+    };
+    const bool is_clear = each_two_sides<D, T>(i, j, R_i + R_j, compare);
+    if (!is_clear) contact = without_bonds<D, T, 2>(ContactStatus::CROSSING);
+  }
+};
+
+/// A smooth piece of the energy of two polygons: that of two sides, with the far end of their bonds
+/// at a tip. As a number it takes the place of the tip in the law.
+struct PieceOfSides {
+  int side_i, side_j, tip;
+
+  static constexpr int TIPS = 8, SIDES = 1 << 8;
+  static PieceOfSides of(int number)
+  {
+    const int sides = number / TIPS;
+    return {sides / SIDES, sides % SIDES, number % TIPS - 1};
+  }
+  int number() const { return (side_i * SIDES + side_j) * TIPS + tip + 1; }
+};
+
+/// Contact of two sides by the law of rods, about the centres of the polygons.
+template <int D, class S>
+Contact<D, S, 2> contact_of_sides(const SpheropolygonBody<D, S> &i,
+                                  const SpheropolygonBody<D, S> &j, SpherocylinderLaw law,
+                                  const PieceOfSides &piece)
+{
+  law.tip = piece.tip;
+  const SpherocylinderContact<D, S> there(sides_of(i, piece.side_i, j, piece.side_j), i.radius(),
+                                          j.radius(), law);
+  return about_centres(there.evaluate(), i.middle(piece.side_i), j.middle(piece.side_j));
+}
+
 /// Contact of two rounded polygons: that of the two of their sides with the largest energy, each
 /// two by the law of rods (SpherocylinderContact), so that polygons of two corners are rods. Sides
 /// that share a corner have the same energy there, of the corner's distance; flat contacts have two
@@ -167,30 +219,15 @@ Contact<D, S, 2> contact_of(const SpheropolygonBody<D, S> &i, const Spheropolygo
                             const SpherocylinderLaw &law)
 {
   using T = ValueOf<S>;
-  const double R_i = i.radius(), R_j = j.radius();
-  auto best = without_bonds<D, T, 2>(ContactStatus::APART);
-  int side_i = 0, side_j = 0;
-  const auto compare = [&](int a, int b, const SpinePair<D, T> &spines) {
-    const Contact<D, T, 2> found = SpherocylinderContact<D, T>(spines, R_i, R_j, law).evaluate();
-    if (found.status == ContactStatus::CROSSING) {
-      best = found;
-      return false;
-    }
-    if (!(found.energy > best.energy)) return true;
-    best = found;
-    side_i = a;
-    side_j = b;
-    return true;
-  };
-  const bool is_clear = each_two_sides<D, T>(values_of(i), values_of(j), R_i + R_j, compare);
-  if (!is_clear) return without_bonds<D, S, 2>(ContactStatus::CROSSING);
-  if (best.status != ContactStatus::TOUCHING) return without_bonds<D, S, 2>(best.status);
+  if (law.tip != NO_TIP) return contact_of_sides(i, j, law, PieceOfSides::of(law.tip));
+  const LargestOfSides<D, T> best(values_of(i), values_of(j), law);
+  if (best.contact.status != ContactStatus::TOUCHING)
+    return without_bonds<D, S, 2>(best.contact.status);
   Contact<D, S, 2> found;
   if constexpr (std::is_same_v<S, T>) {
-    found = about_centres(best, i.middle(side_i), j.middle(side_j));
+    found = about_centres(best.contact, i.middle(best.side_i), j.middle(best.side_j));
   } else {
-    const SpherocylinderContact<D, S> there(sides_of(i, side_i, j, side_j), R_i, R_j, law);
-    found = about_centres(there.evaluate(), i.middle(side_i), j.middle(side_j));
+    found = contact_of_sides(i, j, law, {best.side_i, best.side_j, NO_TIP});
   }
   if (law.sides == Sides::TWO && i.n() + j.n() > 2) name_corner(found);
   return found;
@@ -217,11 +254,27 @@ struct SpheropolygonModel {
   static constexpr bool HAS_SIDES = true;
   static constexpr bool BONDS_ARE_CONTACTS = false;
   static constexpr int OVERLAP_POWER = 1;
-  template <int D> static constexpr bool HAS_KINKS = false;
 
   static Law law(const PowerLaw &bond, Sides sides, bool shortcuts = true)
   {
     return {bond, sides, shortcuts};
+  }
+
+  /// As for rods, one piece for each tip of each two sides.
+  template <int D> static constexpr bool HAS_KINKS = D == 2;
+  template <int D> static int piece(const Body<D> &i, const Body<D> &j, const Law &law)
+  {
+    const LargestOfSides<D, double> best(i, j, law);
+    if (best.contact.status != ContactStatus::TOUCHING) return NO_TIP;
+    const auto spines = sides_of(i, best.side_i, j, best.side_j);
+    const SpherocylinderContact<D, double> there(spines, i.radius(), j.radius(), law);
+    return PieceOfSides{best.side_i, best.side_j, there.tip()}.number();
+  }
+  static Law on_piece(const Law &law, int piece)
+  {
+    Law of_piece = law;
+    of_piece.tip = piece;
+    return of_piece;
   }
 
   static std::optional<Shape> shape_from(const Vec<3> &semi_axes, const Form &form)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scipy.optimize
 from chosen_seeds import chosen_by_seed
+from every_shape import Case, squeezed
 from mixtures import bidisperse
 
 import jamshape as js
@@ -152,3 +153,16 @@ def test_rods_are_at_rest_after_each_step_of_a_shear(alpha):
     start = js.make_packing(rods, n=64, seed=1, u0=1e-7, progress=False)
     run = js.quasistatic_shear(start=start, step=1e-3, strain=0.02, progress=False)
     assert run.at_rest.all()
+
+
+def test_squares_come_to_rest_on_a_kink():
+    """Where the far end of a flat contact passes from one corner to another."""
+    packing = squeezed(Case("spheropolygon", 2), seed=1)
+    landscape = Landscape(packing.with_(law=packing.law.but(power=3.5)))
+    found = minimise(landscape, State.of(packing), "auto", Stop(TOLERANCE))
+    assert found.outcome is Outcome.KINK
+    assert found.residual.largest <= TOLERANCE
+    here = landscape.evaluate(found.state)
+    overlap = landscape.law.overlap_over_harmonic(here.bond_force) * here.bond_force
+    least = min(combined(landscape, found.state, overlap * near) for near in (1e-5, 1e-6, 1e-7))
+    assert least < 0.05 * residual_of(landscape, here).largest
