@@ -201,12 +201,12 @@ struct PieceOfSides {
 /// Contact of two sides by the law of rods, about the centres of the polygons.
 template <int D, class S>
 Contact<D, S, 2> contact_of_sides(const SpheropolygonBody<D, S> &i,
-                                  const SpheropolygonBody<D, S> &j, SpherocylinderLaw law,
+                                  const SpheropolygonBody<D, S> &j, const SpherocylinderLaw &law,
                                   const PieceOfSides &piece)
 {
-  law.tip = piece.tip;
   const SpherocylinderContact<D, S> there(sides_of(i, piece.side_i, j, piece.side_j), i.radius(),
-                                          j.radius(), law);
+                                          j.radius(),
+                                          SpherocylinderModel::on_piece(law, piece.tip));
   return about_centres(there.evaluate(), i.middle(piece.side_i), j.middle(piece.side_j));
 }
 
@@ -260,7 +260,7 @@ struct SpheropolygonModel {
     return {bond, sides, shortcuts};
   }
 
-  /// As for rods, one piece for each tip of each two sides.
+  /// One piece for each tip of each two sides, as for rods.
   template <int D> static constexpr bool HAS_KINKS = D == 2;
   template <int D> static int piece(const Body<D> &i, const Body<D> &j, const Law &law)
   {
@@ -272,9 +272,7 @@ struct SpheropolygonModel {
   }
   static Law on_piece(const Law &law, int piece)
   {
-    Law of_piece = law;
-    of_piece.tip = piece;
-    return of_piece;
+    return SpherocylinderModel::on_piece(law, piece);
   }
 
   static std::optional<Shape> shape_from(const Vec<3> &semi_axes, const Form &form)
