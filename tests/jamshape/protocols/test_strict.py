@@ -141,23 +141,13 @@ def energies_beside(landscape, minimum, size):
     return np.array(energies) / landscape.evaluate(minimum).energy
 
 
-# Packings of the first seed end elsewhere since Newton's method keeps factors. 24, 245 and 32, 476 do end on a
-# kink, one side of which rises in second order only.
-MOVED = pytest.mark.xfail(reason="another seed is to be found", strict=False)
-
-
+# 24, 245 and 32, 725 end on a kink, too, one side of which rises in second order only.
 @chosen_by_seed
-@pytest.mark.parametrize(
-    ("n", "seed"),
-    [
-        pytest.param(32, 152, marks=MOVED),
-        pytest.param(128, 5, marks=pytest.mark.validate),
-    ],
-)
-def test_minimum_on_a_kink_is_proven_by_its_two_sides(n, seed, tmp_path):
-    """The tips of two rods are level: a bond passes from one to the other. In the second, others meet walls below the digits."""
+@pytest.mark.parametrize("seed", [7, pytest.param(1031, marks=pytest.mark.validate)])
+def test_minimum_on_a_kink_is_proven_by_its_two_sides(seed, tmp_path):
+    """The tips of two rods are level: a bond passes from one to the other."""
     out = tmp_path / "packing.h5"
-    make(recipe_for(bidisperse(4.0), n=n, seed=seed, strict=True), out)
+    make(recipe_for(bidisperse(4.0), n=32, seed=seed, strict=True), out)
     stored, packing = read_attributes(out), read_packing(out)
     assert (stored["outcome"], stored["n_negative"], stored["n_kinked"]) == ("converged", 0, 1)
     assert max(stored["residual_force"], stored["residual_torque"]) <= stored["tolerance"]
