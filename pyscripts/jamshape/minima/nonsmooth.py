@@ -71,7 +71,11 @@ def relax(descent: Descent) -> Outcome | None:
         combined = step.evaluation._replace(gradient=-pull * step.x)
         descent.move_to(local_model.base, step.evaluation if is_smooth else combined)
     outcome = descent.outcome()
-    return Outcome.KINK if outcome is Outcome.CONVERGED and not is_smooth else outcome
+    if not is_smooth and outcome is Outcome.CONVERGED:
+        return Outcome.KINK
+    if not is_smooth:  # its forces are those of its side again
+        descent.move_to(descent.state, landscape.evaluate(descent.state))
+    return outcome
 
 
 def _stiffness(descent: Descent) -> float:
