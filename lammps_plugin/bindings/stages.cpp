@@ -41,6 +41,21 @@ StageEnd solve_stage(LocalEnergyModel &of, const PosedStage &stage,
       .solve(stage.guess, stage.other, {factors, n_bonds, kinks.all});
 }
 
+nb::object mixed_gradient(LocalEnergyModel &of, const Array1<double> &x,
+                          const Array1<double> &gradient, const StageKinks &kinks)
+{
+  require(x.shape(0) == of.n() && gradient.shape(0) == of.n(),
+          "x or the gradient does not have one number per coordinate.");
+  require_base(of);
+  const Eigen::VectorXd there = vector(x);
+  require_finite(there, "x");
+  Eigen::VectorXd found = vector(gradient);
+  const Displacement at{there.data(), 0.0};
+  of.renew_pairs(at);
+  mix(kinks.all, of.kinks_at(at, kinks.all, true), found);
+  return array_of(found.data(), found.size());
+}
+
 double size_of(const StageUnits &units, const Array1<double> &shift, const Array1<double> &force,
                const Array1<double> &drag)
 {
@@ -128,7 +143,9 @@ void export_stages(nb::module_ &m)
       .def("solve_stage", &solve_stage, "stage"_a, "factors"_a.none(), "bonds_of_factors"_a,
            "kinks"_a = StageKinks{},
            "Solve a Stage, with factors of an earlier one, the number of bonds at the point of\n"
-           "their Hessian, and the kinks on which it ended. Returns a StageEnd.");
+           "their Hessian, and the kinks on which it ended. Returns a StageEnd.")
+      .def("mixed_gradient", &mixed_gradient, "x"_a, "gradient"_a, "kinks"_a,
+           "Gradient (n,) of the mixtures on kinks at x, from that at x without them.");
 }
 
 }  // namespace jamshape

@@ -70,6 +70,16 @@ struct StageEnd {
   bool solved;
 };
 
+/// Turns a gradient (n,) into that of the mixtures on kinks, which are seen from the same point.
+inline void mix(const std::vector<Kink> &kinks, const std::vector<KinkThere> &there,
+                Eigen::VectorXd &gradient)
+{
+  for (std::size_t k = 0; k < kinks.size(); ++k) {
+    there[k].add(1.0, there[k].change, gradient);
+    there[k].add(kinks[k].weight, there[k].jump, gradient);
+  }
+}
+
 /// Solves a stage as a minimisation. Its gradient is smooth between the kinks where bonds open and
 /// close, and Newton's full steps find the set of closed bonds at once (semismooth Newton: Qi &
 /// Sun, Math. Program. 58, 353 (1993)), mostly in three or four evaluations. A step that a closing
@@ -304,10 +314,7 @@ class StageSolver {
   Vector slope(const Point &at) const
   {
     Vector found = at.gradient;
-    for (std::size_t k = 0; k < held.size(); ++k) {
-      at.kinks[k].add(1.0, at.kinks[k].change, found);
-      at.kinks[k].add(held[k].weight, at.kinks[k].jump, found);
-    }
+    mix(held, at.kinks, found);
     return found;
   }
 

@@ -268,6 +268,7 @@ class LocalEnergyModel:
         bonds_of_factors: int,
         kinks: StageKinks = ...,
     ) -> StageEnd: ...
+    def mixed_gradient(self, x: _Reals, gradient: _Reals, kinks: StageKinks) -> _Reals: ...
     def descend(
         self,
         stop: DescentStop,

@@ -219,12 +219,20 @@ def of_vicinity(fuzz, of, dimension, poses):
             units=units, limits=limits, guess=np.zeros(n), other=np.zeros(n),
         )  # fmt: skip
         if stage is not None:
-            fuzz.call(
+            end = fuzz.call(
                 "solve_stage",
                 about.solve_stage,
                 stage=stage,
                 factors=held["factors"],
                 bonds_of_factors=1,
+            )
+            kinks = _contact.StageKinks() if end is None else end.kinks
+            fuzz.call(
+                "mixed_gradient",
+                about.mixed_gradient,
+                x=np.zeros(n),
+                gradient=np.ones(n),
+                kinks=kinks,
             )
 
     def descend():

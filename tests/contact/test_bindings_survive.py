@@ -30,6 +30,7 @@ def test_bindings_survive_what_they_do_not_expect():
         "counts_of_team",
         "sums",
         "solve_stage",
+        "mixed_gradient",
         "descend",
         "find_rattlers",
     }

@@ -155,9 +155,8 @@ def found_in(tmp_path_factory, request):
     def on_two_ranks():
         at = shared / "pair_styles_on_two_ranks"
         with Path(f"{at}.lock").open("w") as lock:
-            fcntl.flock(
-                lock, fcntl.LOCK_EX
-            )  # two at once would have more ranks than there are cores
+            # Two at once would have more ranks than there are cores.
+            fcntl.flock(lock, fcntl.LOCK_EX)
             if not at.exists():
                 new = Path(f"{at}.new")
                 new.mkdir()

@@ -54,6 +54,8 @@ CREATOR = "jamshape"
 
 _SAME_SIZE = 1e-12  # relative rounding difference between two copies of a size
 
+_MOST_COLUMNS = 4  # numbers of a particle in one array, or of a row of a box
+
 
 class Series(NamedTuple):
     """One observable against time."""
@@ -298,9 +300,9 @@ class FrameReader:
         style = attribute(require_item(self.file, "particles/all"), "shape_style")
         return found | {"shape_style": style, "law": _read_law(self.file)}
 
-    def _fixed(self, name: str, most: int | None = None) -> Any:
+    def _fixed(self, name: str, most: int = _MOST_COLUMNS) -> Any:
         values = require_dataset(self.file, f"particles/all/{name}")
-        _require_most(values, values.shape, self.n, _MOST_COLUMNS if most is None else most)
+        _require_most(values, values.shape, self.n, most)
         return values[()]
 
     def _find_columns(self) -> dict[str, Any]:
@@ -314,9 +316,6 @@ class FrameReader:
                 raise FileFormatError(msg)
             found[name] = rows
         return found
-
-
-_MOST_COLUMNS = 4  # numbers of a particle in one array, or of a row of a box
 
 
 def _require_most(dataset: Any, shape: tuple[int, ...], n: int, most: int = _MOST_COLUMNS) -> None:

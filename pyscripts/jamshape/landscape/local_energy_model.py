@@ -201,6 +201,11 @@ class LocalEnergyModel:
             end.kinks,
         )  # fmt: skip
 
+    def on_kinks(self, x: FloatArray, there: Evaluation, kinks: StageKinks) -> Evaluation:
+        """Return the evaluation at x with the gradient of the mixtures on kinks."""
+        gradient = self._compiled.mixed_gradient(x, there.gradient, kinks)
+        return there._replace(gradient=gradient)
+
     def descend(self, stop: DescentStop, shift: float) -> DescentEnd:
         """Minimise the energy at fixed box by L-BFGS and Newton's method; the base moves along.
 

@@ -24,7 +24,7 @@ from jamshape.landscape.local_energy_model import (
     StageKinks,
     Units,
 )
-from jamshape.minima.descent import Descent, Outcome, residual_of
+from jamshape.minima.descent import Descent, Outcome
 
 # Drag coefficient over the time of the first step, of the longest and of the shortest one, over the stiffness of a bond.
 _FIRST, _LEAST, _MOST = 1e-3, 1e-12, 1.0
@@ -53,9 +53,8 @@ def relax(descent: Descent) -> Outcome | None:
     Outcome or None
         None if neither rest nor another end is reached.
     """
-    landscape, tolerance = descent.landscape, descent.stop.tolerance
-    local_model, kinks, drag = LocalEnergyModel(landscape, descent.state), StageKinks(), _FIRST
-    is_smooth = True
+    landscape, drag = descent.landscape, _FIRST
+    local_model, kinks = LocalEnergyModel(landscape, descent.state), StageKinks()
     for _ in range(_STEPS):
         if descent.outcome() or drag > _MOST:
             break
@@ -65,16 +64,13 @@ def relax(descent: Descent) -> Outcome | None:
             drag, kinks = _SHORTER * drag, StageKinks()
             continue
         drag, kinks = max(_LONGER * drag, _LEAST), step.kinks
+        on_kinks = local_model.on_kinks(step.x, step.evaluation, kinks)
         local_model.move_to(local_model.at(step.x, 0.0))
-        is_smooth = residual_of(landscape, step.evaluation).largest <= tolerance
-        # The combined forces of a stage balance the drag.
-        combined = step.evaluation._replace(gradient=-pull * step.x)
-        descent.move_to(local_model.base, step.evaluation if is_smooth else combined)
+        descent.move_to(local_model.base, on_kinks)
     outcome = descent.outcome()
-    if not is_smooth and outcome is Outcome.CONVERGED:
-        return Outcome.KINK
-    if not is_smooth:  # its forces are those of its side again
-        descent.move_to(descent.state, landscape.evaluate(descent.state))
+    if outcome is Outcome.CONVERGED:
+        return Outcome.KINK if len(kinks) else outcome
+    descent.move_to(descent.state, landscape.evaluate(descent.state))  # with the forces of its side
     return outcome
 
 
