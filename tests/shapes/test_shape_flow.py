@@ -1,10 +1,13 @@
 """Overdamped motion of every shape, by LAMMPS and by the implicit integrator."""
 
 import math
+from itertools import islice
 
 import numpy as np
 import pytest
-from every_shape import EPS, MIXTURES, SIDES, TYPICAL, close_to, pressed, scattered, squeezed
+from every_shape import (
+    EPS, MIXTURES, SIDES, TYPICAL, close_to, particles_of, pressed, scattered, squeezed,
+)  # fmt: skip
 from lammps_runs import fix_vector, loaded, state_of
 from slopes import slope_at_0
 
@@ -16,12 +19,17 @@ from jamshape.flow.implicit import Flow, Protocol
 from jamshape.lammps.session import Session
 from jamshape.landscape import Landscape
 from jamshape.packing import State
+from jamshape.protocols.approach import compressed_start
+from jamshape.protocols.random_start import random_packing
 
 pytestmark = pytest.mark.lammps
 
 CASES = [*TYPICAL, *MIXTURES]
 EVERY = pytest.mark.parametrize("case", CASES, ids=str)
-PLANE = pytest.mark.parametrize("case", [c for c in CASES if c.dimension == 2], ids=str)
+PLANE, TYPICAL_IN_PLANE = (
+    pytest.mark.parametrize("case", [c for c in cases if c.dimension == 2], ids=str)
+    for cases in (CASES, TYPICAL)
+)
 
 KAPPA = 1e-3
 
@@ -81,6 +89,29 @@ def test_lone_particles_follow_the_box_implicitly(case):
     assert steps[-1].phi == close_to(start.phi * math.exp(0.2), 1e-12)
     assert flow.evaluations < 20 * len(steps)
     assert flow.time == close_to(10.0, 1e-12)
+
+
+# --- slow motion ---------------------------------------------------------------------------------
+
+
+@TYPICAL_IN_PLANE
+def test_slow_motion_below_jamming_takes_few_steps(case):
+    """Corners touch over a length far below the size of a square, with as short a time to relax."""
+    start = compressed_start(random_packing(8, 0.4, 0, particles_of(case)), 0.6)
+    flow, protocol = Flow(State.of(start)), Protocol(1e-7, 0.605)
+    steps = implicit.compress(Landscape(start, sides=SIDES), flow, protocol)
+    *_, last = islice(steps, 1000)
+    assert last.phi == close_to(0.605, 1e-12)
+
+
+@TYPICAL_IN_PLANE
+def test_unit_of_overlaps_is_that_of_the_contacts(case):
+    start = squeezed(case, overlap=1e-4)
+    landscape = Landscape(start, sides=SIDES)
+    run = implicit.ImplicitFlow(landscape, Flow(State.of(start)), Protocol(1e-7, 0.9))
+    run.advance()
+    reach = find_contacts(start, sides=SIDES).bonds.reach
+    assert 0.99 * reach.min() <= run.reach <= 1.5 * reach.max()
 
 
 # --- the same motion by all methods --------------------------------------------------------------

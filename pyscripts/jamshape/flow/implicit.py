@@ -420,7 +420,7 @@ class ImplicitFlow:
             self.still, self.drag = np.append(self.still, 0.0), np.append(self.drag, self.box.drag)
         self._least_drag = _least_drag(landscape, protocol.k_d)
         self.measure = float(landscape.particles.measures.sum())
-        self.size = 2 * float(landscape.inner_radius.mean())
+        self.size = self.reach = 2 * float(landscape.inner_radius.mean())
         self.dimension = landscape.particles.dimension
         self.host = Host(np.zeros((self.dimension, self.dimension)))
         self.columns = [_as_slice(landscape.column[:, k]) for k in range(self.dimension)]
@@ -464,6 +464,7 @@ class ImplicitFlow:
         self.host, longest = self.protocol.leg(flow, self.phi)
         # Stage accuracy suffices for units and energies.
         here = flow._here or self._present()
+        self.reach = self._reach_of(here)
         if not flow.velocity.size:
             self._begin(here)
         while True:
@@ -581,7 +582,7 @@ class ImplicitFlow:
     @property
     def _stable(self) -> float:
         """Estimate the longest explicit step, [time], drag over stiffness of a contact or two."""
-        longest = self._least_drag * self.size**2 / self.landscape.stiffness
+        longest = self._least_drag * self.reach**2 / self.landscape.stiffness
         return _EXPLICIT_BELOW * (min(longest, self.box.longest_explicit) if self.box else longest)
 
     @property
@@ -627,8 +628,20 @@ class ImplicitFlow:
     def _unit(self, evaluation: Evaluation) -> float:
         """Typical overlap, at least that caused by drag on a particle a diameter from the centre."""
         least = self._rate * self._least_drag * self.size
-        harmonic = max(evaluation.bond_force, least) * self.size**2 / self.landscape.stiffness
-        return harmonic * self.landscape.law.overlap_over_harmonic(harmonic / self.size)
+        harmonic = max(evaluation.bond_force, least) * self.reach**2 / self.landscape.stiffness
+        return harmonic * self.landscape.law.overlap_over_harmonic(harmonic / self.reach)
+
+    def _reach_of(self, evaluation: Evaluation) -> float:
+        """Length over which contacts have their energy, less than the size where corners touch.
+
+        Overlaps x of bonds with energies k (x / d)^m / m have the mean x = m U / F, weighted by their forces, the sum
+        of which is F. From it, and the mean force k x^(m - 1) / d^m, follows d, larger the more the forces differ.
+        """
+        force, power = evaluation.bond_force, self.landscape.law.power
+        if not force > 0:
+            return self.size
+        overlap = power * evaluation.energy / (evaluation.n_bonds * force)
+        return min(self.size, (self.landscape.stiffness * overlap ** (power - 1) / force) ** (1 / power))
 
     def _rms(self, vector: FloatArray) -> float:
         """Root mean square over particles of a vector of coordinates."""
@@ -637,11 +650,10 @@ class ImplicitFlow:
     def _units(self, evaluation: Evaluation) -> Units:
         overlap, power = self._unit(evaluation), self.landscape.law.power
         bonds = max(evaluation.n_bonds, self.landscape.particles.n)
-        energy = bonds * self.landscape.stiffness * (overlap / self.size) ** power
-        force = (
-            self.landscape.stiffness * overlap / self.size**2 * (overlap / self.size) ** (power - 2)
-        )
-        return Units(force, energy, math.sqrt(overlap * self.size), self.landscape.particles.n)
+        relative = overlap / self.reach
+        energy = bonds * self.landscape.stiffness * relative**power
+        force = self.landscape.stiffness * overlap / self.reach**2 * relative ** (power - 2)
+        return Units(force, energy, math.sqrt(overlap * self.reach), self.landscape.particles.n)
 
     def _is_extended(self, unit: float) -> bool:
         rounding = float(np.finfo(np.float64).eps) * self.size
