@@ -143,7 +143,7 @@ CASES = [
     *each(SLOW, ["--n"], NO_COUNTS),
     *each(SLOW, ["--phi-slow"], ["nan", "-1", "x"]),
     (f"{SLOW} --phi-end 0.5", "an end above the start"),
-    (f"{SLOW} --phi-start 0.1", "above that of the random start"),
+    (f"{SLOW} --phi-start 1", "phi-start is 1"),
     (f"{SLOW} --method euler", "invalid choice"),
     ("slow --start none.h5 --out new.h5", "none.h5"),
     ("slow --start text.h5 --out new.h5", "text.h5"),

@@ -56,7 +56,8 @@ _SAME_STEP = 1.5
 # Tilt above which a box gets other cell vectors.
 _LARGEST_TILT = 0.6
 
-_EXPLICIT_BELOW = 0.5  # longest explicit step, in drag over stiffness
+# Longest explicit step, in drag over stiffness of a contact: particles with flat faces turn a hundred times as fast.
+_EXPLICIT_BELOW = 0.01
 _EXPLICIT_IN_A_ROW = 20
 _LEAST_STEP = 1e-3  # shortest explicit step, over the longest
 

@@ -10,7 +10,6 @@ from jamshape.arguments import checked
 from jamshape.checks import (
     RANGES,
     ArgumentError,
-    Range,
     require_given,
     require_in,
     require_no_effect,
@@ -47,9 +46,6 @@ KAPPA_SLOW = 1e-8
 _PHI_HANDED_OVER = {2: 0.8, 3: 0.5}
 _SAME = 1e-9  # of packing fractions, up to rounding
 _DT, _ERROR = 0.05, 1e-4
-
-_PHI_RANDOM = 0.4  # of the random start of a slow compression
-_HANDED_OVER = Range(0.41, 2.0, "a packing fraction above that of the random start, which is 0.4,")
 
 
 @accepts_old(tolerance="integration_tolerance")
@@ -266,9 +262,7 @@ def slow_compress(
     of = _start_of(particles, start, phi=(phi_start, phi_end), sides=sides, **sizes)
 
     def first() -> Packing:
-        # Random insertion of bodies in space may end far below that of rods in the plane.
-        random = _PHI_RANDOM if of.dimension == 2 else None
-        packing = of.known or compressed_start(of.random(random), of.phi)
+        packing = of.known or compressed_start(of.random(), of.phi)
         _require_end_ahead(packing, protocol)
         return packing
 
@@ -290,7 +284,7 @@ def _start_of(
         dimension = 2 if sizes["dimension"] is None else sizes["dimension"]
         require_one_of("dimension", dimension, (2, 3))
         phi_start = _PHI_HANDED_OVER[dimension] if phi_start is None else phi_start
-        require_in("phi_start", phi_start, _HANDED_OVER if dimension == 2 else RANGES["phi_start"])
+        require_in("phi_start", phi_start, RANGES["phi_start"])
         require_rising(phi_start, phi_end)
         require_known_kinks(sides, dimension)
         return Start.of(particles, Asked(phi=phi_start, **sizes), None, usual_phi=phi_start)

@@ -14,7 +14,7 @@ from jamshape.files.disk import named
 from jamshape.front.packing import Packing
 from jamshape.front.reading import Held, packing_of
 from jamshape.packing import Packing as PackingLike
-from jamshape.protocols.random_start import random_packing, start_below
+from jamshape.protocols.random_start import start_below
 from jamshape.shapes.particles import Particles
 from jamshape.shapes.shape import Interaction, Stiffness, law_text, stiffness_text
 
@@ -132,9 +132,7 @@ class Start(NamedTuple):
         own = {"n": self.n, self.phi_name: self.phi, "seed": self.seed}
         return self.particles.identity | own
 
-    def random(self, phi: float | None = None) -> PackingLike:
-        """Make the random start at a packing fraction; by default the one asked for, or the densest possible."""
+    def random(self) -> PackingLike:
+        """Make a random start at the packing fraction asked for, or one that random insertion reaches."""
         assert self.particles
-        if phi is not None:
-            return random_packing(self.n, phi, self.seed, self.particles, self.dimension)
         return start_below(self.phi, self.n, self.seed, self.particles, self.dimension)
