@@ -187,7 +187,7 @@ def test_a_box_yields_to_a_normal_pressure_by_explicit_and_implicit_steps(case, 
     asked = {"start": start, "gdot": 1e-3, "strain": 1e-3, "pressure": held, "t_box": 2.0, "rows": 2, "progress": False}  # fmt: skip
     explicit, implicit_ = (
         js.shear(integrator=name, integration_tolerance=error, file=tmp_path / f"{name}.h5", **asked)
-        for name, error in (("rkc2", 1e-6), ("tr-bdf2", 1e-4))
+        for name, error in (("rkc2", 1e-6), ("tr-bdf2", 3e-5))
     )  # fmt: skip
     assert abs(explicit["phi"][-1] / start.phi - 1) > 1e-4
     off = {

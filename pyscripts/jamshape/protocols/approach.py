@@ -40,9 +40,6 @@ _ROUNDING = 1e-9  # relative, of a packing fraction
 
 _NO_END = 1e3  # a packing fraction that is never reached
 
-# Time steps stay below this fraction of the stable one; denser states allow less.
-_STABLE = 0.6
-
 _LARGEST_STRAIN = 1e-3  # between rows, while the rate is high
 _PART = 0.3  # of the pressure, between rows while it falls
 
@@ -64,7 +61,7 @@ class Approach:
     p_open
         Pressure to return to by opening the box at that rate.
     dt
-        Time step; reduced to the stable one reported by the fix.
+        Longest of the adaptive time steps.
     strain
         Strain of the box between rows at the slowest rate; larger at faster ones.
 
@@ -80,7 +77,7 @@ class Approach:
     p_flow: float = 2e-4
     p_end: float = 1e-3
     p_open: float = 1e-6
-    dt: float = 0.25
+    dt: float = 5.0
     strain: float = 5e-5
 
     def __post_init__(self) -> None:
@@ -156,11 +153,13 @@ class ApproachDriver:
     def __init__(
         self, first: Packing, settings: Approach, checkpoint: Checkpoint | None = None
     ) -> None:
-        told = checkpoint or {"kappa": settings.kappa_start, "dt": settings.dt, "rows": 0}
+        told = checkpoint or {"kappa": settings.kappa_start, "rows": 0}
         self._first, self._settings, self._rows = first, settings, told["rows"]
         self._pressure: float
         self._pressure, self._marked = told.get("pressure", math.inf), checkpoint or None
-        flow = Compression(kappa=told["kappa"], phi_end=_NO_END, dt=told["dt"], sides=2)
+        flow = Compression(
+            kappa=told["kappa"], phi_end=_NO_END, dt=settings.dt, sides=2, integrator="rkc2"
+        )
         self._session = Session()
         try:
             self._run = CompressionRun(
@@ -229,10 +228,9 @@ class ApproachDriver:
         return self._run.packing() if self._session.step else self._first
 
     def checkpoint(self) -> Checkpoint:
-        """Return the state of LAMMPS, the rate, the time step, and the last pressure."""
+        """Return the state of LAMMPS, the rate, and the last pressure."""
         if self._marked is None:
-            settings = self._run.settings
-            found = {"kappa": settings.kappa, "dt": settings.dt, "rows": self._rows}
+            found = {"kappa": self._run.settings.kappa, "rows": self._rows}
             self._marked = found | {"pressure": self._pressure, "run": self._run.mark()}
         return self._marked
 
@@ -260,7 +258,4 @@ def _advance(run: CompressionRun, settings: Approach, strain: float) -> motion.R
         )
         raise ApproachError(msg)
     sample.observables["kappa"] = run.settings.kappa
-    stable = min(settings.dt, _STABLE * sample.observables["dt_max"])
-    if not 0.5 * stable <= run.settings.dt <= stable:
-        run.change(dt=0.7 * stable if stable < settings.dt else stable)
     return sample

@@ -138,9 +138,10 @@ PROTOCOLS: dict[str, UsualProtocol] = {
     "dynamics": UsualProtocol(
         _by_dynamics,
         {
-            "n": 256, "phi_start": 0.4, "tolerance": 1e-8, "u0": 1e-15, "accuracy": 1e-7,
+            "n": 256, "phi_start": 0.1, "tolerance": 1e-8, "u0": 1e-15, "accuracy": 1e-7,
             "kappa": 4e-7, "p_end": 1e-3,
         },
+        {"phi_start": 0.4},
     ),
     "steps": _ATHERMAL,
     COMPRESSED: UsualProtocol(
