@@ -41,6 +41,7 @@ from spherocylinder_pairs import (
     tip_to_side,
     tip_to_tip,
 )
+from thinned import in_turn
 
 K_E = 1.7
 ALPHA = 1e-3, 100.0
@@ -227,11 +228,19 @@ LEAST_SMOOTH = 0.7
 LEAST_RESOLVED = 0.3
 
 
-@pytest.mark.parametrize("power", [2.0, 2.5])
-@EVERY_CASE
-def test_second_derivatives_are_differences_of_force_and_torques(
-    case, dimension, sides, power, measured
-):
+def named(one):
+    """Words of a case, for the name of its test."""
+    return "-".join(getattr(word, "__name__", str(word)) for word in one)
+
+
+EVERY_POWER = in_turn(CASES, [2.0, 2.5, 3.0])
+
+
+@pytest.mark.parametrize(
+    ("of", "power"), EVERY_POWER, ids=[named((*p.values[0], p.values[1])) for p in EVERY_POWER]
+)
+def test_second_derivatives_are_differences_of_force_and_torques(of, power, measured):
+    case, dimension, sides = of
     packing = replace(packing_of(case, dimension), power=power)
     found = packing.derivatives(sides, K_E)
     h = steps(packing, sides)
@@ -252,12 +261,11 @@ def nearly_discs(rng, dimension):
     return deep(rng, N, dimension, overlaps(rng, N), depth=(1e2, 1e10))
 
 
-@pytest.mark.parametrize("power", [2.0, 3.0])
-@pytest.mark.parametrize("dimension", [2, 3])
-@pytest.mark.parametrize("sides", [1, 2])
-def test_second_derivatives_are_those_of_the_energy_written_a_second_time(
-    dimension, sides, power, measured
-):
+@pytest.mark.parametrize(
+    ("of", "power"), in_turn([(2, 1), (2, 2), (3, 2), (3, 1)], [2.0, 3.0])
+)  # fmt: skip
+def test_second_derivatives_are_those_of_the_energy_written_a_second_time(of, power, measured):
+    dimension, sides = of
     rng = np.random.default_rng([42, dimension])
     cases = [case for case, D, s in CASES if (D, s) == (dimension, sides)]
     cases += [nearly_discs] * (sides == 2)  # within |sin| = 1e-8, one bond has a kink

@@ -28,6 +28,7 @@ from spherocylinder_pairs import (
     relative_errors,
     touching,
 )
+from thinned import in_turn
 
 K_E = 1.7
 N = 10_000
@@ -71,11 +72,11 @@ def one_sided_comparison(pairs, sides):
     return beyond, jump
 
 
-@pytest.mark.parametrize("power", [2.0, 2.5, 3.0])
-@pytest.mark.parametrize(("dimension", "sides", "kind"), EVERY_CLASS)
+@pytest.mark.parametrize(("contact", "power"), in_turn(EVERY_CLASS, [2.0, 2.5, 3.0]))
 def test_force_and_torques_are_derivatives_of_the_energy_written_a_second_time(
-    dimension, sides, kind, power, measured
+    contact, power, measured
 ):
+    dimension, sides, kind = contact
     pairs = touching(dimension, sides, kind)
     assert len(pairs) >= N
     result = contacts(pairs, sides, K_E, power)

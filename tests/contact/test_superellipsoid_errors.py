@@ -6,16 +6,12 @@ part.
 
 from __future__ import annotations
 
-import shutil
-from pathlib import Path
-
 import numpy as np
 import pytest
 from superellipsoid_pairs import Bodies, packed, shapes_of
 
 from jamshape import _contact
 
-ERRORS = Path(__file__).parents[2] / "analysis" / "errors"
 NAMES = ("energy", "force", "torque")
 EPS = np.finfo(float).eps
 
@@ -104,21 +100,11 @@ def test_sums_and_second_derivatives_have_these_digits():
         np.testing.assert_allclose(short[name] / size, long[name] / size, atol=1e-9)
 
 
-@pytest.fixture(scope="module")
-def study(tmp_path_factory):
-    """The script, and its reference compiled."""
-    if shutil.which("g++") is None:
-        pytest.skip("no g++")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(ERRORS))
-        script = __import__("superellipsoid_error")
-        yield script, script.compiled(tmp_path_factory.mktemp("reference"))
-
-
+@pytest.mark.parametrize("size", [300, pytest.param(1000, marks=pytest.mark.validate)])
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_energy_force_and_torque_are_within_their_errors(study, dimension, measured):
+def test_energy_force_and_torque_are_within_their_errors(study, dimension, size, measured):
     script, reference = study
-    couples = script.targeted_pairs(np.random.default_rng(4), 1000, dimension)
+    couples = script.targeted_pairs(np.random.default_rng(4), size, dimension)
     found = script.measured(reference, couples)
     for name, of in found.items():
         measured(**{f"{name} {q}": of.error[:, k].max() for k, q in enumerate(NAMES)})

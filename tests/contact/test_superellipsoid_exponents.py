@@ -5,9 +5,7 @@ Every pair's normal and point, put into the definition, bound the scale at which
 
 from __future__ import annotations
 
-import shutil
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -357,22 +355,12 @@ def nearly_aligned(seed, size, ranges_i, ranges_j):
     return Pairs(i, j, pairs.n_i, pairs.n_j).at_scale(np.sqrt(1 - overlap))
 
 
-@pytest.fixture(scope="module")
-def study(tmp_path_factory):
-    """The script that compares with 33 digits, and its reference compiled."""
-    if shutil.which("g++") is None:
-        pytest.skip("no g++")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(Path(__file__).parents[2] / "analysis" / "errors"))
-        script = __import__("superellipsoid_error")
-        yield script, script.compiled(tmp_path_factory.mktemp("reference"))
-
-
+@pytest.mark.parametrize("size", [20, pytest.param(60, marks=pytest.mark.validate)])
 @pytest.mark.parametrize("of_i", RANGES)
-def test_energy_force_and_torque_are_within_their_errors(of_i, study, measured):
+def test_energy_force_and_torque_are_within_their_errors(of_i, size, study, measured):
     """Against a solution in 33 digits."""
     script, reference = study
-    pairs = nearly_aligned(3, 60, RANGES[of_i], RANGES["any"])
+    pairs = nearly_aligned(3, size, RANGES[of_i], RANGES["any"])
     assert np.all(pairs.contacts()["status"] == 1)
     found = script.measured(reference, script.Couples(*pairs.rows))
     for name, of in found.items():

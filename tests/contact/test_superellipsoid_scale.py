@@ -95,19 +95,21 @@ def check_against_oracle(i, j, measured, tolerance):
     assert np.max(misses) < tolerance
 
 
+@pytest.mark.parametrize("size", [5, pytest.param(20, marks=pytest.mark.validate)])
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("p", EXPONENTS)
-def test_scale_is_that_of_independent_optimisers(p, dimension, measured):
+def test_scale_is_that_of_independent_optimisers(p, dimension, size, measured):
     rng = np.random.default_rng(round(1000 * p) + dimension)
-    i, j = random_pairs(rng, 20, dimension, p)
+    i, j = random_pairs(rng, size, dimension, p)
     check_against_oracle(i, j, measured, 1e-7 if p in (0.55, 10.0) else 1e-10)
 
 
+@pytest.mark.parametrize("size", [10, pytest.param(30, marks=pytest.mark.validate)])
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_scale_of_unequal_exponents(dimension, measured):
+def test_scale_of_unequal_exponents(dimension, size, measured):
     rng = np.random.default_rng(dimension)
-    p_i, p_j = rng.choice(EXPONENTS, (2, 30))
-    i, j = random_pairs(rng, 30, dimension, p_i, p_j)
+    p_i, p_j = rng.choice(EXPONENTS, (2, size))
+    i, j = random_pairs(rng, size, dimension, p_i, p_j)
     check_against_oracle(i, j, measured, 1e-7)
 
 

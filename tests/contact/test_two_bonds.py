@@ -35,6 +35,7 @@ from spherocylinder_pairs import (
     row_dot,
     scaled,
 )
+from thinned import in_turn
 
 # --- smooth paths through contact --------------------------------------------------------------
 
@@ -214,10 +215,15 @@ def paths_of(shapes, dimension, n=N_PATHS):
     return Paths(rng, shapes(rng, n), dimension)
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
-@pytest.mark.parametrize("shapes", SHAPES, ids=lambda shapes: shapes.__name__)
-@pytest.mark.parametrize("sides", [1, 2])
-def test_energy_has_no_jumps(shapes, dimension, sides, measured):
+@pytest.mark.parametrize(
+    ("shapes", "bonds"),
+    [
+        *in_turn(SHAPES, [(2, 2), (3, 2)]),
+        *in_turn(SHAPES, [(3, 1), (2, 1)], kept={equal, unequal}),
+    ],
+)
+def test_energy_has_no_jumps(shapes, bonds, measured):
+    dimension, sides = bonds
     paths = paths_of(shapes, dimension)
     jumps, valid = largest_jump(paths, library(sides))
     measured(largest_jump=jumps.max(), scanned=valid.mean())
@@ -266,8 +272,7 @@ def exponents_on(paths):
     return np.where(x.has_two, x.exponent, 0.0), x
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
-@pytest.mark.parametrize("shapes", SHAPES, ids=lambda shapes: shapes.__name__)
+@pytest.mark.parametrize(("shapes", "dimension"), in_turn(SHAPES, [2, 3]))
 def test_the_scan_visits_whole_fading_and_absent_second_bonds(shapes, dimension):
     w, _ = exponents_on(paths_of(shapes, dimension))
     visited = [(w > 0.001) & (w < 0.999), w == 0.0]

@@ -18,8 +18,8 @@ from jamshape.files.h5md import read_attributes, read_packing
 pytestmark = pytest.mark.lammps
 
 DRIVER = Path(__file__).parents[2] / "pyscripts" / "sweep.py"
-DYNAMICS = ("--protocol", "dynamics", "--kappa", "1e-5", "--p-end", "3e-3")
-FAST = ("--n", "16", *DYNAMICS, "--phi-start", "0.55", "--u0", "1e-6")
+FAST = ("--n", "16", "--phi-start", "0.55", "--u0", "1e-6")
+DYNAMICS = ("--protocol", "dynamics", "--kappa", "1e-5", "--p-end", "3e-3")  # takes seconds
 IMPOSSIBLE = "1e6"  # so long that it meets its own images in any direction
 
 
@@ -121,7 +121,7 @@ def wait_until(condition, seconds):
     "ending", [signal.SIGKILL, pytest.param(signal.SIGINT, marks=pytest.mark.validate)]
 )
 def test_a_sweep_that_is_killed_alone_leaves_no_process_and_goes_on(tmp_path, ending, measured):
-    samples = ("--alpha", "0", "1", "--samples", "2")
+    samples = ("--alpha", "0", "1", "--samples", "2", *DYNAMICS)
     with subprocess.Popen(
         command(tmp_path, *samples),
         stdout=subprocess.DEVNULL,

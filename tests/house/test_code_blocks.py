@@ -16,6 +16,7 @@ import pytest
 from code_blocks import ROOT, Block, blocks_of, command_lines, pages, text_of
 from programs import check, run
 from sessions import BLOCK, make_clone, run_in_bash
+from thinned import quick
 
 import jamshape as js
 from jamshape.commands import COMMANDS, sweep
@@ -265,10 +266,15 @@ def block_of(page):
 
 
 WITH_CODE = dict.fromkeys(block.page for block in ALL_BLOCKS if not is_directive(block))
+LONG = {
+    f"docs/how-to/{name}.md"
+    for name in ("shear", "twelve-tasks", "command", "many-packings", "stress")
+}
+"""Pages that take more than ten seconds."""
 
 
 @pytest.mark.lammps
-@pytest.mark.parametrize("page", WITH_CODE)
+@pytest.mark.parametrize("page", quick(WITH_CODE, WITH_CODE.keys() - LONG))
 def test_the_code_of_a_page_runs(page, tmp_path, monkeypatch):
     folder = tmp_path / "clone"
     folder.mkdir()

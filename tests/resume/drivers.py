@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Container, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import pytest
 from killing import forked
 
 import jamshape as js
@@ -25,7 +23,7 @@ NONE = ((f"{RECORDER}.PAUSE", 1e9), (f"{RECORDER}.SECONDS", 1e9))
 """No checkpoint before the end."""
 SHORT = (
     ("jamshape.flow.implicit_driver.STEPS_PER_MARK", 40),
-    ("jamshape.flow.lammps_driver.EVALUATIONS_PER_MARK", 250),
+    ("jamshape.flow.lammps_driver.EVALUATIONS_PER_MARK", 400),
 )
 """Marks close to each other."""
 FAR = (
@@ -38,28 +36,6 @@ RODS = js.Spherocylinders(alpha=1)
 DISCS = js.Spherocylinders(alpha=0.01)
 DIMERS = js.Dimers(alpha=1)
 BODIES = js.Superellipsoids(w1=0.6)
-
-
-def in_turn(*columns: Any, kept: Container[str] | None = None) -> list[Any]:
-    """Return all combinations of parameters; in the default suite only those that take turns: each value occurs.
-
-    With `kept` the default suite takes only these of the first ones.
-    """
-    every = []
-    for numbers in itertools.product(*(range(len(column)) for column in columns)):
-        values = [column[k] for column, k in zip(columns, numbers, strict=True)]
-        first, *others = numbers
-        is_quick = all(
-            k == first % len(column) for k, column in zip(others, columns[1:], strict=True)
-        )
-        is_quick &= kept is None or values[0] in kept
-        every.append(pytest.param(*values, marks=() if is_quick else pytest.mark.validate))
-    return every
-
-
-def quick(names: Iterable[str], kept: Container[str]) -> list[Any]:
-    """Return parameters, of which the default suite takes those that are kept."""
-    return [n if n in kept else pytest.param(n, marks=pytest.mark.validate) for n in names]
 
 
 # --- starts ---------------------------------------------------------------------------------------
@@ -172,7 +148,7 @@ DRIVERS = {
     ),
     "cyclic shear in LAMMPS": Case(
         "cyclic_shear", "rods",  # its box takes other cell vectors, to and fro
-        {"amplitude": 0.6, "period": 240.0, "cycles": 2, "rows": 12},
+        {"amplitude": 0.6, "period": 240.0, "cycles": 2, "rows": 4},
         {"amplitude": 0.5, "period": 250.0, "cycles": 3, "flow": "pure", "rows": 16, "frames": 1,
          "integrator": "heun/adaptive", "integration_tolerance": 1e-3, "sides": 1},
         {"period": 4e7, "rows": 1_000_000},
@@ -192,7 +168,7 @@ DRIVERS = {
     ),
     "quasistatic shear": Case(
         "quasistatic_shear", "dimers",
-        {"step": 2e-2, "strain": 0.3, "frames": 5},
+        {"step": 2e-2, "strain": 0.16, "frames": 5},
         {"step": 1e-2, "strain": 0.5, "flow": "pure", "pressure": 1e-3, "tolerance": 1e-9, "frames": 4},
         {"step": 1e-3, "strain": 1000.0},
     ),

@@ -7,6 +7,7 @@ import json
 import subprocess
 import sys
 import zlib
+from functools import cache
 from pathlib import Path
 
 import damage
@@ -21,8 +22,11 @@ h5py = pytest.importorskip("h5py")
 pytestmark = pytest.mark.lammps
 
 KINDS = ("packing", "run", "unfinished", "modes", "mdanalysis")
-FLIPS = [pytest.param(10, id="few"), pytest.param(200, id="many", marks=pytest.mark.validate)]
-CUTS = 40
+COUNTS = [
+    pytest.param((10, 10), id="few"),
+    pytest.param((200, 40), id="many", marks=pytest.mark.validate),
+]
+"""Numbers of files with a flipped bit, and of truncated files."""
 
 
 @pytest.fixture(scope="module")
@@ -60,23 +64,37 @@ def faults(jobs, results):
     ]
 
 
+@pytest.fixture(scope="module")
+def damaged(files, tmp_path_factory):
+    """Files with flipped bits and truncated files, both read in one process: jobs and results, and what is refused."""
+
+    @cache
+    def of(kind, counts):
+        n, size = counts[0], files[kind].stat().st_size
+        ends = (*np.linspace(0, size, counts[1], dtype=int)[:-1], size - 1)
+        jobs = [["flip", seed] for seed in range(n)] + [["cut", int(end)] for end in ends]
+        folder = tmp_path_factory.mktemp("damaged")
+        results, never = read_in_a_process(kind, files[kind], folder, jobs)
+        return (jobs[:n], results[:n]), (jobs[n:], results[n:]), never
+
+    return of
+
+
+@pytest.mark.parametrize("counts", COUNTS)
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("flips", FLIPS)
-def test_no_flipped_bit_is_read_as_another_number(flips, kind, files, tmp_path, measured):
-    jobs = [["flip", seed] for seed in range(flips)]
-    results, never = read_in_a_process(kind, files[kind], tmp_path, jobs)
+def test_no_flipped_bit_is_read_as_another_number(kind, counts, damaged, measured):
+    (jobs, results), _, never = damaged(kind, counts)
     assert faults(jobs, results) == []
     assert never == (["load"] if kind == "mdanalysis" else [])
     refused = sum(bool(result["refused"]) for result in results)
-    measured(flips=flips, refused=refused)
+    measured(flips=len(jobs), refused=refused)
     assert refused > 0
 
 
+@pytest.mark.parametrize("counts", COUNTS)
 @pytest.mark.parametrize("kind", KINDS)
-def test_truncated_files_are_refused(kind, files, tmp_path):
-    size = files[kind].stat().st_size
-    jobs = [["cut", int(end)] for end in (*np.linspace(0, size, CUTS, dtype=int)[:-1], size - 1)]
-    results, _ = read_in_a_process(kind, files[kind], tmp_path, jobs)
+def test_truncated_files_are_refused(kind, counts, damaged):
+    _, (jobs, results), _ = damaged(kind, counts)
     assert faults(jobs, results) == []
     assert not any(result["same"] for result in results)
 

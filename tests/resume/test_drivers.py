@@ -12,6 +12,7 @@ import sys
 import time
 from contextlib import suppress
 from pathlib import Path
+from typing import NamedTuple
 
 import h5py
 import pytest
@@ -24,14 +25,13 @@ from drivers import (
     RODS,
     SHORT,
     dense,
-    in_turn,
-    quick,
     resume,
     run_case,
     started,
     write_start,
 )
 from killing import CALLS, differences, ended, forked, light, said
+from thinned import in_turn, quick
 
 import jamshape as js
 from jamshape.checks import TimeLimitError
@@ -64,26 +64,48 @@ def patched(monkeypatch):
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory, starts):
-    """Runs of cases that were let be, how long they took with checkpoints, and in how many calls files changed."""
+    """Runs of cases without a checkpoint, each in a process of its own."""
     made = {}
 
     def of(name):
         if name not in made:
             folder = tmp_path_factory.mktemp("whole")
-            file = folder / "run.h5"
-            code = ended(started(name, file, starts, NONE))
+            made[name] = folder / "run.h5"
+            code = ended(started(name, made[name], starts, NONE))
             assert code == 0, said(folder)
+        return made[name]
+
+    return of
+
+
+class Marked(NamedTuple):
+    """A run of a case with a checkpoint at every mark."""
+
+    file: Path
+    seconds: float
+    """How long it took."""
+    calls: int
+    """How many calls changed files."""
+
+
+@pytest.fixture(scope="module")
+def marked(tmp_path_factory, starts):
+    """Runs of cases with a checkpoint at every mark, in this process."""
+    made = {}
+
+    def of(name):
+        if name not in made:
+            file = tmp_path_factory.mktemp("marked") / "run.h5"
             began = time.monotonic()
-            context = pytest.MonkeyPatch.context
-            with context() as patch:
+            with pytest.MonkeyPatch.context() as patch:
                 for key, value in (*SHORT, *EVERY):
                     module, constant = key.rsplit(".", 1)
                     patch.setattr(importlib.import_module(module), constant, value)
                 for call in CALLS:  # `light` wraps them
                     patch.setattr(os, call, getattr(os, call))
                 calls = light(0)
-                CASES[name].run(folder / "every.h5", starts)
-            made[name] = file, folder / "every.h5", time.monotonic() - began, len(calls)
+                CASES[name].run(file, starts)
+            made[name] = Marked(file, time.monotonic() - began, len(calls))
         return made[name]
 
     return of
@@ -108,12 +130,11 @@ def unfinished(name, file, starts):
 # --- the same bits --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", quick(CASES, {*DRIVERS, "shear in space"}))
-def test_checkpoints_do_not_change_a_run(name, whole):
+@pytest.mark.parametrize("name", quick(CASES, RECORDED))
+def test_checkpoints_do_not_change_a_run(name, whole, marked):
     """In a process of its own without any, and here with one at every mark."""
-    without, every, *_ = whole(name)
-    require_same(without, every)
-    assert read_attributes(without)["finished"]
+    require_same(whole(name), marked(name).file)
+    assert read_attributes(whole(name))["finished"]
 
 
 @pytest.mark.parametrize("name", quick(CASES, {*DRIVERS, "shear in space"}))
@@ -130,7 +151,7 @@ def test_a_run_put_down_at_every_mark_ends_as_if_it_were_not(
                 CASES[name].run(file, starts, seconds=0.0)
         stops += 1
     assert stops > 1 or name == "implicit compression at two rates"
-    require_same(whole(name)[0], file)
+    require_same(whole(name), file)
     assert names(tmp_path) == {"run.h5"}
 
 
@@ -143,9 +164,9 @@ def wait_for(path):
         time.sleep(0.005)
 
 
-def kill_and_compare(name, whole, starts, folder, kills, seed):
+def kill_and_compare(name, marked, starts, folder, kills, seed):
     """Kill a run at random moments and in calls that change files, and let it end; return the number of kills."""
-    expected, _, seconds, calls = whole(name)
+    expected, seconds, calls = marked(name)
     file, rng, count = folder / "run.h5", random.Random(seed), 0
     for k in range(kills):
         # The first one when its file holds the start alone, then every second one between two calls.
@@ -171,24 +192,24 @@ def kill_and_compare(name, whole, starts, folder, kills, seed):
     return count
 
 
-@pytest.mark.parametrize("name", quick(CASES, DRIVERS))
+@pytest.mark.parametrize("name", quick(CASES, RECORDED))
 def test_a_run_that_is_killed_ends_as_if_nothing_had_happened(
-    name, whole, starts, tmp_path, measured
+    name, marked, starts, tmp_path, measured
 ):
     kills = 3 if name in DRIVERS else 2
-    measured(kills=kill_and_compare(name, whole, starts, tmp_path, kills, seed=len(name)))
+    measured(kills=kill_and_compare(name, marked, starts, tmp_path, kills, seed=len(name)))
 
 
 @pytest.mark.validate
 @pytest.mark.parametrize("name", CASES)
-def test_hundreds_of_kills(name, whole, starts, tmp_path, measured):
+def test_hundreds_of_kills(name, marked, starts, tmp_path, measured):
     """No file is damaged, no row lost or repeated: five kills a run until there are enough, with commands 300."""
     count = runs = 0
     while count < 15:
         runs += 1
         folder = tmp_path / str(runs)
         folder.mkdir()
-        count += kill_and_compare(name, whole, starts, folder, kills=5, seed=runs)
+        count += kill_and_compare(name, marked, starts, folder, kills=5, seed=runs)
         assert runs < 30, "hardly any run is killed before it ends"
     measured(kills=count, runs=runs)
 
@@ -263,9 +284,9 @@ def test_a_second_start_is_one_sentence_and_changes_nothing(name, starts, tmp_pa
 
 
 @pytest.mark.parametrize("name", quick(DRIVERS, RECORDED))
-def test_two_starts_with_other_settings_never_mix(name, whole, starts, tmp_path, patched):
+def test_two_starts_with_other_settings_never_mix(name, marked, starts, tmp_path, patched):
     """Both at once, killed, and then both again: one file, one run."""
-    expected, _, seconds, _ = whole(name)
+    expected, seconds, _ = marked(name)
     file, (key, value) = tmp_path / "run.h5", next(iter(CASES[name].others.items()))
     both = [started(name, file, starts, EVERY, **more) for more in ({}, {key: value})]
     time.sleep(max(0.5, seconds / 2))
@@ -289,21 +310,19 @@ def test_two_starts_with_other_settings_never_mix(name, whole, starts, tmp_path,
         require_same(alone, file)
 
 
-@pytest.mark.parametrize("name", DRIVERS)
-def test_other_settings_are_refused_by_name(name, whole, starts, tmp_path, patched):
+@pytest.mark.parametrize(("name", "state"), in_turn([*DRIVERS], ["unfinished", "finished"]))
+def test_other_settings_are_refused_by_name(name, state, whole, starts, tmp_path, patched):
     patched(*SHORT, *NONE)
-    file = tmp_path / "run.h5"
-    unfinished(name, file, starts)
-    for path in (file, whole(name)[0]):
-        before = path.read_bytes()
-        for key, value in CASES[name].others.items():
-            with pytest.raises(
-                ValueError, match=r"holds a .*, expected .*; .* use again"
-            ) as refused:
-                CASES[name].run(path, starts, **{key: value})
-            assert "\n" not in str(refused.value)
-            assert f" with {key}" in str(refused.value), key
-        assert path.read_bytes() == before
+    file = whole(name) if state == "finished" else tmp_path / "run.h5"
+    if state == "unfinished":
+        unfinished(name, file, starts)
+    before = file.read_bytes()
+    for key, value in CASES[name].others.items():
+        with pytest.raises(ValueError, match=r"holds a .*, expected .*; .* use again") as refused:
+            CASES[name].run(file, starts, **{key: value})
+        assert "\n" not in str(refused.value)
+        assert f" with {key}" in str(refused.value), key
+    assert file.read_bytes() == before
 
 
 @pytest.mark.parametrize("name", DRIVERS)
@@ -311,7 +330,7 @@ def test_another_start_is_refused(name, whole, starts):
     phi = CASES[name].settings.get("phi")
     more = {"phi": (phi[0] + 0.01, phi[1])} if phi else {"start": dense(RODS, 12, 0.83)}
     with pytest.raises(ValueError, match=r"holds a .* with (phi_start|start|alpha)=.*, expected"):
-        CASES[name].run(whole(name)[0], starts, **more)
+        CASES[name].run(whole(name), starts, **more)
 
 
 def test_another_packing_of_the_same_density_is_refused(tmp_path):
@@ -333,7 +352,7 @@ def test_again_begins_anew(name, whole, starts, tmp_path, patched):
     with pytest.raises(TimeLimitError):
         CASES[name].run(file, starts, seconds=0.0, **{key: value})
     CASES[name].run(file, starts, again=True)
-    require_same(whole(name)[0], file)
+    require_same(whole(name), file)
     with pytest.raises(TimeLimitError):
         CASES[name].run(file, starts, again=True, seconds=0.0)
     assert not read_attributes(file)["finished"]
@@ -341,7 +360,7 @@ def test_again_begins_anew(name, whole, starts, tmp_path, patched):
 
 @pytest.mark.parametrize("name", DRIVERS)
 def test_a_finished_run_is_loaded_and_left_alone(name, whole, starts):
-    file = whole(name)[0]
+    file = whole(name)
     before = file.stat().st_mtime_ns, file.read_bytes()
     run = CASES[name].run(file, starts)
     assert len(js.resume(file, progress=False)) == len(run)
@@ -372,7 +391,7 @@ def test_a_disk_without_room_leaves_the_last_checkpoint(name, whole, starts, tmp
     assert file.read_bytes() == before
     assert names(tmp_path) == ALONE
     CASES[name].run(file, starts)
-    require_same(whole(name)[0], file)
+    require_same(whole(name), file)
 
 
 def with_progress(name, file, starts, target):
@@ -398,7 +417,7 @@ def test_no_run_ends_for_its_standard_error(name, target, whole, starts, tmp_pat
     file = tmp_path / "run.h5"
     args = (name, file, starts, target)
     assert ended(forked(with_progress, args, tmp_path / "said.log", SHORT)) == 0, said(tmp_path)
-    require_same(whole(name)[0], file)
+    require_same(whole(name), file)
 
 
 @pytest.mark.parametrize("name", quick(DRIVERS, RECORDED))
@@ -411,7 +430,7 @@ def test_a_link_and_its_target_are_one_run(name, whole, starts, tmp_path, patche
     assert names(tmp_path / "there") == {"run.h5"}
     CASES[name].run(file, starts)
     assert link.is_symlink()
-    require_same(whole(name)[0], link)
+    require_same(whole(name), link)
 
 
 def forgotten(file):

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drivers import EVERY, quick
+from drivers import EVERY
 from killing import (
     GIVEN,
     command,
@@ -25,6 +25,7 @@ from killing import (
 from lattices import discs
 from scenes import pressed
 from superellipsoid_packings import pressed_superellipsoids
+from thinned import quick
 
 from jamshape.files.h5md import write_frames, write_packing
 from jamshape.protocols.random_start import random_packing
@@ -175,7 +176,7 @@ def kill_and_compare(whole, tmp_path, name, kills, seed):
     return count
 
 
-QUICK = {"pack by dynamics", "sweep", "initial, H5MD", "modes", "draw", "export"}
+QUICK = {"pack", "sweep", "initial, H5MD", "modes", "draw", "export"}
 
 
 @pytest.mark.parametrize("name", quick(CASES, QUICK))

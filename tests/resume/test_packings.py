@@ -5,8 +5,9 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
-from drivers import EVERY, NONE, SHORT, quick
+from drivers import EVERY, NONE, SHORT
 from killing import differences, ended, forked, said
+from thinned import quick
 
 import jamshape as js
 from jamshape.checks import TimeLimitError

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from pictures import image, is_color
+from thinned import in_turn
 
 from jamshape.drawing.styles import CONTACT, KINDS, RATTLER
 from jamshape.files.h5md import write_packing, write_run
@@ -145,14 +146,20 @@ def test_a_frame_of_a_run(report, problem, tmp_path):
     assert "expected frame 2" in problem(SCRIPT, tmp_path / "run.h5", "--frame", 2, *asked)
 
 
+DRAWN = [(name, D) for name in SHAPES for D in SHAPES[name].dimensions]
+HIGHER = {2: "S4", 3: "C4"}  # order beyond the nematic one
+
+
 @pytest.mark.parametrize(
-    ("shape", "dimension"), [(name, D) for name in SHAPES for D in SHAPES[name].dimensions]
+    ("case", "colors"), in_turn(DRAWN, [("kind", "S2"), ("orientation", "S4"), ("one",)])
 )
-def test_every_shape_in_the_plane_and_in_space(report, tmp_path, shape, dimension):
+def test_every_shape_in_the_plane_and_in_space(report, tmp_path, case, colors):
+    shape, dimension = case
     path = tmp_path / "mixture.h5"
     write_packing(path, mixture(shape, dimension))
-    orders = {2: ("S2", "S4"), 3: ("S2", "C4")}[dimension]
-    for color in ("kind", "orientation", "one", *orders):
+    orders = ("S2", HIGHER[dimension])
+    for one in colors:
+        color = HIGHER[dimension] if one == "S4" else one
         out = tmp_path / f"{color}.png"
         asked = ("--color", color, "--dpi", 80, *(("--level", 2) if dimension == 3 else ()))
         found = report(SCRIPT, path, *asked, "--out", out)

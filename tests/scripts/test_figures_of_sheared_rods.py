@@ -28,7 +28,7 @@ def folder(tmp_path_factory):
         for phi in (0.9, 0.95, 1.0):
             for gdot in (3e-2, 1e-2, 3e-3):
                 file = root / "shears" / f"alpha{alpha:g}_phi{phi}_gdot{gdot}.h5"
-                js.shear(js.Spherocylinders(alpha=alpha), n=16, phi=phi, gdot=gdot, strain=2.0, rows=100,
+                js.shear(js.Spherocylinders(alpha=alpha), n=16, phi=phi, gdot=gdot, strain=1.0, rows=50,
                          integrator="rkc2", file=file, progress=False)  # fmt: skip
     return root
 

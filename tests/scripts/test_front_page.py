@@ -4,13 +4,26 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 from PIL import Image
+
+import jamshape as js
 
 ROOT = Path(__file__).parents[2]
 PICTURE = re.compile(r"pictures/(front_\w+\.png)")
 
 
-def test_the_strip_is_that_of_the_pages(report, tmp_path):
+def of_few_particles(monkeypatch):
+    """Make every packing of a quarter of its particles, which are sheared in ten times larger steps."""
+    make, shear = js.make_packing, js.quasistatic_shear
+    monkeypatch.setattr(js, "make_packing", lambda shape, n, **more: make(shape, n=n // 4, **more))
+    monkeypatch.setattr(js, "quasistatic_shear", lambda step, **more: shear(step=10 * step, **more))
+
+
+@pytest.mark.parametrize("size", ["few", pytest.param("all", marks=pytest.mark.validate)])
+def test_the_strip_is_that_of_the_pages(report, tmp_path, monkeypatch, size):
+    if size == "few":
+        of_few_particles(monkeypatch)
     found = report("front_page.py", "--out", tmp_path)
     phi = [value for name, value in found.items() if name.startswith("phi_")]
     assert len(phi) == 5

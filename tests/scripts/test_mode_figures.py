@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from mixtures import bidisperse, superellipsoids
 from numpy.testing import assert_allclose
 from pictures import image
+from thinned import quick
 
 from common.mode_axes import bin_edges
 from common.mode_tables import read_tables
@@ -253,7 +254,7 @@ OTHERS = {
 }
 
 
-@pytest.mark.parametrize("name", OTHERS)
+@pytest.mark.parametrize("name", quick(OTHERS, {"dimers"}))
 def test_other_shapes_have_the_same_figures(report, tmp_path, name):
     particles, phi = OTHERS[name]
     table = with_modes(tmp_path, particles, phi)

@@ -8,7 +8,9 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from in_process import jamshape
 from snakemake_runs import run_snakemake
+from thinned import in_turn
 
 from jamshape.commands.reproduce import PAPERS, SCALES
 
@@ -52,10 +54,8 @@ def drawn(names):
     return {f"{int(number)}{letter}" for one in found for number, letter in one}
 
 
-@pytest.mark.parametrize("scale", SCALES)
-@pytest.mark.parametrize("folder", FOLDERS)
-def test_every_figure_of_the_paper_is_planned_at_every_scale(folder, scale, tmp_path):
-    names, said = planned(folder, scale, tmp_path)
+def require_every_figure(folder, names, said):
+    """The figures of the list are those that are planned."""
     scripts = listed(folder)
     assert scripts
     assert {
@@ -66,19 +66,35 @@ def test_every_figure_of_the_paper_is_planned_at_every_scale(folder, scale, tmp_
     assert {one for one in asked if not any(re.match(rf"{one}[a-c]?$", s) for s in shown)} == set()
 
 
-def test_numbers_of_figures_are_read_from_the_list():
-    assert labels("Draw densities: Figs. 11(a), 14(a) and 20") == {"11a", "14a", "20"}
-    assert labels("Draw: Fig. 9 b and the inset of Fig. 11 b") == {"9b", "11b"}
-    assert drawn(["fig08a_11a", "fig11b_inset", "singular_limit"]) == {"8a", "11a", "11b"}
+@pytest.fixture(scope="module", params=FOLDERS)
+def full(request, tmp_path_factory):
+    """A paper's folder, the names of all figures at full scale and what Snakemake says."""
+    return request.param, *planned(request.param, "full", tmp_path_factory.mktemp("full"))
 
 
-@pytest.mark.parametrize("folder", FOLDERS)
-def test_results_that_the_papers_numbers_are_beside_are_planned(folder, tmp_path):
-    names, _ = planned(folder, "full", tmp_path)
+def test_every_figure_of_the_paper_is_planned_at_full_scale(full):
+    require_every_figure(*full)
+
+
+def test_results_that_the_papers_numbers_are_beside_are_planned(full):
+    folder, names, _ = full
     text = (ANALYSIS / folder / "paper.csv").read_text()
     asked = set(re.findall(r"[,\"]([a-z]\w+)/", text))
     assert asked
     assert asked <= names
+
+
+@pytest.mark.parametrize(
+    ("scale", "folder"), in_turn([scale for scale in SCALES if scale != "full"], FOLDERS)
+)
+def test_every_figure_of_the_paper_is_planned_at_smaller_scales(scale, folder, tmp_path):
+    require_every_figure(folder, *planned(folder, scale, tmp_path))
+
+
+def test_numbers_of_figures_are_read_from_the_list():
+    assert labels("Draw densities: Figs. 11(a), 14(a) and 20") == {"11a", "14a", "20"}
+    assert labels("Draw: Fig. 9 b and the inset of Fig. 11 b") == {"9b", "11b"}
+    assert drawn(["fig08a_11a", "fig11b_inset", "singular_limit"]) == {"8a", "11a", "11b"}
 
 
 @pytest.mark.parametrize("folder", FOLDERS)
@@ -88,23 +104,19 @@ def test_all_scales_have_the_same_keys(folder):
     assert len({tuple(sorted(scale)) for scale in scales.values()}) == 1
 
 
-@pytest.mark.parametrize("folder", FOLDERS)
-@pytest.mark.parametrize(
-    ("setting", "words"),
-    [
-        ("scale=huge", "reproduce.smk: scale is huge, expected one of demo, small, full"),
-        (
-            "size=3",
-            "reproduce.smk: the setting size is not known, expected scale, samples or figures",
-        ),
-        ("figures=fig99", "reproduce.smk: fig99 is no figure, expected some of "),
-    ],
-)
-def test_nonsense_is_refused_before_any_job(folder, setting, words, tmp_path):
+NONSENSE = {
+    "scale=huge": "reproduce.smk: scale is huge, expected one of demo, small, full",
+    "size=3": "reproduce.smk: the setting size is not known, expected scale, samples or figures",
+    "figures=fig99": "reproduce.smk: fig99 is no figure, expected some of ",
+}
+
+
+@pytest.mark.parametrize(("setting", "folder"), in_turn([*NONSENSE], FOLDERS))
+def test_nonsense_is_refused_before_any_job(setting, folder, tmp_path):
     asked = ["--cores", "1", "-n", "--config", setting]
     done = run_snakemake(ANALYSIS / folder / "reproduce.smk", tmp_path, *asked)
     assert done.returncode != 0
-    assert words in done.stdout
+    assert NONSENSE[setting] in done.stdout
 
 
 def test_a_job_leaves_what_was_typed_what_it_said_and_how_long_it_took(tmp_path):
@@ -127,11 +139,9 @@ def test_a_job_leaves_what_was_typed_what_it_said_and_how_long_it_took(tmp_path)
 
 def listed_jobs(tmp_path, *words):
     """Jobs that the command would run."""
-    asked = [sys.executable, "-m", "jamshape", "reproduce", *words, "--dry-run"]
-    asked += ["--out", str(tmp_path / "of a paper")]
-    done = subprocess.run(asked, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return set(json.loads(done.stdout.splitlines()[-1])["planned"])
+    done = jamshape("reproduce", *words, "--dry-run", "--out", tmp_path / "of a paper")
+    assert not done.code
+    return set(done.report["planned"])
 
 
 def test_the_command_lists_its_jobs(tmp_path):

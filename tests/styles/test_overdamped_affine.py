@@ -36,6 +36,7 @@ from lammps_scenes import (
     wrapped,
 )
 from superellipsoid_scenes import crowd
+from thinned import in_turn
 
 from jamshape import contacts
 
@@ -81,14 +82,15 @@ def lonely_particles(dimension, edge):
                    image=image)  # fmt: skip
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
-@pytest.mark.parametrize("reference", ["center", "corner"])
-@pytest.mark.parametrize(("kappa", "steps"), [(np.log(10) / 20, 2000), (1e-10, 100_000)])
-@pytest.mark.parametrize("shape", ["rods", "superellipsoids"])
-def test_without_contact_particles_follow_the_box(
-    shape, kappa, steps, reference, dimension, tmp_path, measured
-):
-    dt = 0.01
+FAST, SLOW = (np.log(10) / 20, 2000), (1e-10, 100_000)  # rates and numbers of steps
+LONELY = [("rods", FAST), ("rods", SLOW), ("superellipsoids", SLOW), ("superellipsoids", FAST)]
+
+
+@pytest.mark.parametrize(
+    ("lonely", "reference", "dimension"), in_turn(LONELY, ["center", "corner"], [2, 3])
+)
+def test_without_contact_particles_follow_the_box(lonely, reference, dimension, tmp_path, measured):
+    (shape, (kappa, steps)), dt = lonely, 0.01
     if shape == "rods":
         packing = wrapped(lonely_particles(dimension, 200.0 if kappa > 1e-3 else 30.0))
     else:
@@ -513,8 +515,7 @@ def estimated_rate(packing, k_d, folder, sides="one", integrator="heun"):
     return rate, limit, float(out.split("rate ")[-1].split()[0])
 
 
-@pytest.mark.parametrize("alpha", [0.0, 0.5, 4.0])
-@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize(("alpha", "dimension"), in_turn([4.0, 0.5, 0.0], [3, 2]))
 def test_estimated_rate_is_the_largest_eigenvalue(dimension, alpha, tmp_path, measured):
     k_d, of_bonds, of_differences = 1.3, [], []
     for seed in (1, 2, 3, 4, 5):

@@ -1,11 +1,8 @@
 """make_packing and minimise to a pressure, a packing fraction or an energy, in boxes that yield."""
 
-import subprocess
-import sys
-from json import loads
-
 import numpy as np
 import pytest
+from in_process import jamshape
 
 import jamshape as js
 from jamshape.checks import ArgumentError, TimeLimitError
@@ -56,16 +53,19 @@ def test_an_isotropic_box_by_pressure_and_by_energy_is_one_state():
     assert by_pressure.box.matrix[0, 1] == 0
 
 
+@pytest.mark.parametrize("seconds", [0.1, pytest.param(0.0, marks=pytest.mark.validate)])
 @pytest.mark.parametrize("target", TARGETS[:3], ids=str)
-def test_it_resumes_with_the_same_bits(target, tmp_path):
+def test_it_resumes_with_the_same_bits(target, seconds, tmp_path):
+    """Put down at its first mark, and every second time only after these seconds."""
     whole = made(file=tmp_path / "whole.h5", **target)
     parts = tmp_path / "parts.h5"
-    for _ in range(1000):
+    for stops in range(1000):
         try:
-            found = made(file=parts, seconds=0.0, **target)
+            found = made(file=parts, seconds=seconds * (stops % 2), **target)
         except TimeLimitError:
             continue
         break
+    assert stops > 1
     assert (found.position == whole.position).all()
     assert (found.box.matrix == whole.box.matrix).all()
     assert found.results["box_steps"] == whole.results["box_steps"]
@@ -132,11 +132,13 @@ def test_what_has_no_effect_on_a_state_is_refused(given, said):
     assert said in str(caught.value)
 
 
-def test_commands(tmp_path):
+def test_commands(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
     def run(words):
-        command = [sys.executable, "-m", "jamshape", *words.split()]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
-        return loads(done.stdout.splitlines()[-1])
+        done = jamshape(*words.split())
+        assert not done.code
+        return done.report
 
     found = run(
         "pack --alpha 0 --n 16 --pressure 1e-4 --box free --stable-to-shear --out packing.h5"
