@@ -6,7 +6,15 @@ from itertools import islice
 import numpy as np
 import pytest
 from every_shape import (
-    EPS, MIXTURES, SIDES, TYPICAL, close_to, particles_of, pressed, scattered, squeezed,
+    EPS,
+    MIXTURES,
+    SIDES,
+    TYPICAL,
+    close_to,
+    particles_of,
+    pressed,
+    scattered,
+    squeezed,
 )  # fmt: skip
 from lammps_runs import fix_vector, loaded, state_of
 from slopes import slope_at_0

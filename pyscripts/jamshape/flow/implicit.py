@@ -643,8 +643,8 @@ class ImplicitFlow:
         if not force > 0:
             return self.size
         overlap = power * evaluation.energy / (evaluation.n_bonds * force)
-        stiffness = float(force / overlap ** (power - 1))
-        return min(self.size, (self.landscape.stiffness / stiffness) ** (1 / power))
+        reach: float = (self.landscape.stiffness * overlap ** (power - 1) / force) ** (1 / power)
+        return min(self.size, reach)
 
     def _rms(self, vector: FloatArray) -> float:
         """Root mean square over particles of a vector of coordinates."""
