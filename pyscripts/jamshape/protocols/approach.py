@@ -34,7 +34,7 @@ ROWS_PER_MARK = 50
 _KAPPA_FAST, _PART_OF_STRENGTH, _STRAIN_FAST = 1e-4, 0.02, 5e-4
 
 # Largest number of time steps: days for small packings. Slower rates need implicit steps.
-MOST_STEPS = 1_000_000_000
+MOST_STEPS = 50_000_000
 
 _ROUNDING = 1e-9  # relative, of a packing fraction
 
@@ -153,12 +153,12 @@ class ApproachDriver:
     def __init__(
         self, first: Packing, settings: Approach, checkpoint: Checkpoint | None = None
     ) -> None:
-        told = checkpoint or {"kappa": settings.kappa_start, "rows": 0}
+        told = checkpoint or {"kappa": settings.kappa_start, "dt": settings.dt, "rows": 0}
         self._first, self._settings, self._rows = first, settings, told["rows"]
         self._pressure: float
         self._pressure, self._marked = told.get("pressure", math.inf), checkpoint or None
         flow = Compression(
-            kappa=told["kappa"], phi_end=_NO_END, dt=settings.dt, sides=2, integrator="rkc2"
+            kappa=told["kappa"], phi_end=_NO_END, dt=told["dt"], sides=2, integrator="rkc2"
         )
         self._session = Session()
         try:
@@ -228,9 +228,10 @@ class ApproachDriver:
         return self._run.packing() if self._session.step else self._first
 
     def checkpoint(self) -> Checkpoint:
-        """Return the state of LAMMPS, the rate, and the last pressure."""
+        """Return the state of LAMMPS, the rate, the time step, and the last pressure."""
         if self._marked is None:
-            found = {"kappa": self._run.settings.kappa, "rows": self._rows}
+            settings = self._run.settings
+            found = {"kappa": settings.kappa, "dt": settings.dt, "rows": self._rows}
             self._marked = found | {"pressure": self._pressure, "run": self._run.mark()}
         return self._marked
 
@@ -244,6 +245,9 @@ class ApproachDriver:
 
 
 def _advance(run: CompressionRun, settings: Approach, strain: float) -> motion.Row:
+    longest = min(settings.dt, strain / abs(run.settings.kappa))
+    if not 0.5 * longest <= run.settings.dt <= longest:
+        run.change(dt=longest)
     step = abs(run.settings.kappa) * run.settings.dt
     run.advance(min(run.session.step + max(1, round(strain / step)), MOST_STEPS + 1))
     sample = run.sample()

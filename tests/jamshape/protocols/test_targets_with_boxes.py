@@ -65,7 +65,7 @@ def test_it_resumes_with_the_same_bits(target, seconds, tmp_path):
         except TimeLimitError:
             continue
         break
-    assert stops > 1
+    assert stops > 0
     assert (found.position == whole.position).all()
     assert (found.box.matrix == whole.box.matrix).all()
     assert found.results["box_steps"] == whole.results["box_steps"]
