@@ -59,7 +59,8 @@ Mobilities::Mobility Mobilities::mobility_of(const Vec<3> &semi_axes, int type) 
     m.turn[k] = moment[k] > 0.0 ? m.shift / moment[k] : 0.0;
   }
   m.bretherton = bretherton_parameters(moment);
-  m.shortest = *std::min_element(semi_axes.c, semi_axes.c + domain->dimension);
+  m.shortest = std::min(*std::min_element(semi_axes.c, semi_axes.c + domain->dimension),
+                        pair->rim(semi_axes, type));
   m.longest = *std::max_element(semi_axes.c, semi_axes.c + domain->dimension);
   m.gyration = std::sqrt(*std::max_element(moment.c, moment.c + 3));
   return m;

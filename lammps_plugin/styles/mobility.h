@@ -54,7 +54,7 @@ class Mobilities : protected LAMMPS_NS::Pointers {
     double shift;
     Vec<3> turn;        // per body axis
     Vec<3> bretherton;  // per body axis: response to the host's strain, 0 if round about the axis
-    double shortest;    // semi-axis
+    double shortest;    // semi-axis, or the rim if that is narrower
     double longest;     // largest distance of the surface from the centre
     double gyration;    // length that one radian stands for
   };

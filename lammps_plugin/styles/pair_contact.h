@@ -10,6 +10,7 @@
 #include "particle_view.h"
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <functional>
 #include <map>
@@ -79,6 +80,8 @@ class PairContact : public LAMMPS_NS::Pair {
   /// Drag coefficients of a particle of a type, and whether any contact of the present particles
   /// can rotate one.
   virtual SubstrateDrag drag(const Vec<3> &semi_axes, int type) const = 0;
+  /// Distance from a particle's surface to a core that no other may enter, if below its semi-axes.
+  virtual double rim(const Vec<3> &, int) const { return INFINITY; }
   bool particles_turn() const { return any_turns; }
 
   /// Settings behind the name of the style that determine its energy, with a space before.

@@ -104,6 +104,12 @@ template <class Model> class PairContactOf : public PairContact {
   }
 
  protected:
+  std::optional<typename Model::Shape> shape_from(const Vec<3> &semi_axes, int type) const
+  {
+    const std::optional<typename Model::Form> &form = forms[type];
+    return form ? Model::shape_from(semi_axes, *form) : std::nullopt;
+  }
+
   Sides sides = Sides::TWO;
 
   std::string style_name() const override { return name(); }
@@ -154,12 +160,6 @@ template <class Model> class PairContactOf : public PairContact {
              std::declval<const Body<D> &>(), std::declval<const Body<D> &>(),
              std::declval<const typename Model::Law &>(), std::declval<Vec<D> &>()))>>
       : std::true_type {};
-
-  std::optional<typename Model::Shape> shape_from(const Vec<3> &semi_axes, int type) const
-  {
-    const std::optional<typename Model::Form> &form = forms[type];
-    return form ? Model::shape_from(semi_axes, *form) : std::nullopt;
-  }
 
   typename Model::Shape required_shape(const Vec<3> &semi_axes, int type) const
   {

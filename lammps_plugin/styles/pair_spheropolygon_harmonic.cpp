@@ -13,6 +13,12 @@ class PairSpheropolygonHarmonic : public PairWithSides<SpheropolygonModel> {
  public:
   using PairWithSides::PairWithSides;
 
+  double rim(const Vec<3> &semi_axes, int type) const override
+  {
+    const SpheropolygonModel::Shape shape = *this->shape_from(semi_axes, type);
+    return shape.scale * shape.polygon->rounding;
+  }
+
  protected:
   std::string without_force() const override { return "overlapping cores"; }
 };

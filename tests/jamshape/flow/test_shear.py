@@ -156,3 +156,11 @@ def test_a_packing_fraction_that_a_random_start_has_needs_no_compression(phi, tm
     run = js.shear(js.Spherocylinders(alpha=1), n=16, phi=phi, gdot=1e-2, strain=0.1, rows=5,
                    file=tmp_path / "a.h5", progress=False)  # fmt: skip
     np.testing.assert_allclose(run.phi, phi, rtol=1e-9)
+
+
+def test_nearly_sharp_corners_are_not_passed_in_one_step():
+    """Their contacts are a fiftieth of a square long; a longer step passes from one side of them to the other."""
+    corners = [(0.5, -0.5), (0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5)]
+    squares = js.Spheropolygons(corners=corners, rounding=0.02)
+    run = js.shear(squares, n=16, phi=0.6, gdot=1e-4, strain=0.05, rows=5, progress=False)
+    assert run.strain[-1] == pytest.approx(0.05)
