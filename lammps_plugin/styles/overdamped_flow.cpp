@@ -29,8 +29,8 @@ namespace {
 
 Vec<3> vec3(const double *from) { return {{from[0], from[1], from[2]}}; }
 
-/// Largest displacement of a particle in one step, over its shortest semi-axis or its rim; beyond it
-/// particles could pass through contacts.
+/// Largest displacement of a particle in one step, over its shortest semi-axis or its rim; beyond
+/// it particles could pass through contacts.
 constexpr double LARGEST_STEP = 0.5;
 
 double step_limit(const Mobilities::Mobility &of) { return LARGEST_STEP * of.shortest; }

@@ -162,6 +162,16 @@ class Row:
     observables: dict[str, float]
 
 
+def drag_over_force(packing: Packing, rate: float, k_d: float = 1.0, k_e: Stiffness = 1.0) -> float:
+    """Estimate the drag on a particle held by others, over the strength of one contact.
+
+    The drag is that at the host's velocity at its outer radius; a contact bears its stiffness, the smallest
+    of a table, over the distance of first touch.
+    """
+    pull = k_d * packing.measures * rate * packing.outer_radius
+    return float((2 * pull * packing.inner_radius).max() / np.min(k_e))
+
+
 _Motion = TypeVar("_Motion", bound=Motion)
 
 

@@ -8,11 +8,9 @@ from abc import abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-import numpy as np
-
 from jamshape.checks import MOST_STEPS, RANGES, require_in, require_one_of, require_positive
 from jamshape.flow.box_control import BoxControl
-from jamshape.flow.motion import FlowRun, Motion
+from jamshape.flow.motion import FlowRun, Motion, drag_over_force
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -120,18 +118,9 @@ class Shearing(Motion):
         """Return the strain among observables."""
         return found[_STRAINS[self.flow]]
 
-    def drag_over_force(self, packing: Packing) -> float:
-        """Estimate the drag on a particle held by others, over the strength of one contact.
-
-        The drag is that at the host's velocity at its outer radius; a contact bears its stiffness, the smallest
-        of a table, over the distance of first touch.
-        """
-        pull = self.k_d * packing.measures * self.gdot * packing.outer_radius
-        return float((2 * pull * packing.inner_radius).max() / np.min(self.k_e))
-
     def warning(self, packing: Packing) -> str:
         """Return a warning if the rate may drive particles through each other, else an empty text."""
-        ratio = self.drag_over_force(packing)
+        ratio = drag_over_force(packing, self.gdot, self.k_d, self.k_e)
         if ratio < _BEARABLE:
             return ""
         return (

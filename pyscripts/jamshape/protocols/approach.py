@@ -12,12 +12,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from jamshape.checks import require_positive
 from jamshape.files.checkpoint import Checkpoint
 from jamshape.flow import motion
 from jamshape.flow.compression import Compression, CompressionRun
+from jamshape.flow.motion import drag_over_force
 from jamshape.lammps.session import Session
 from jamshape.packing import Packing
 from jamshape.recording.driver import Plan, Row, Told
@@ -31,7 +30,7 @@ ROWS_PER_MARK = 50
 
 # Rate of `compressed_start`, unless its drag exceeds a part of the force at which contacts break, and the largest
 # strain in one of its adaptive time steps, which are stable for every shape.
-_KAPPA_FAST, _PART_OF_STRENGTH, _STRAIN_FAST = 1e-4, 0.02, 5e-4
+_KAPPA_FAST, _PART_OF_STRENGTH, _STRAIN_FAST = 1e-4, 0.01, 5e-4
 
 # Largest number of time steps: days for small packings. Slower rates need implicit steps.
 MOST_STEPS = 50_000_000
@@ -103,7 +102,7 @@ def compressed_start(start: Packing, phi: float) -> Packing:
     """Compress a random packing fast, in LAMMPS, to the start of slow flows, unless it is that dense already."""
     if start.phi >= phi * (1 - _ROUNDING):
         return start
-    kappa = _fast_rate(start)
+    kappa = min(_KAPPA_FAST, _PART_OF_STRENGTH / drag_over_force(start, 1.0))
     dt = _STRAIN_FAST / kappa
     with Session() as session:
         fast = Compression(kappa=kappa, phi_end=phi, dt=dt, sides=2, integrator="rkc2")
@@ -112,14 +111,6 @@ def compressed_start(start: Packing, phi: float) -> Packing:
         run = CompressionRun(session, fast.in_steps(start.phi, steps, start.dimension), start)
         run.advance(run.last_step)
         return run.packing()
-
-
-def _fast_rate(start: Packing) -> float:
-    """Return a rate that long particles withstand, whose ends the host takes past each other fast."""
-    bodies = start.compiled()
-    drag = np.array(bodies.measure) * 2 * np.array(bodies.outer_radius)  # at the rate 1
-    strength = 1 / (2 * np.array(bodies.inner_radius))
-    return min(_KAPPA_FAST, _PART_OF_STRENGTH * float((strength / drag).min()))
 
 
 def plan(start: Callable[[], Packing], settings: Approach, made_from: Mapping[str, Any]) -> Plan:
