@@ -640,7 +640,7 @@ class ImplicitFlow:
         of which is F. From it, and the mean force k x^(m - 1) / d^m, follows d, larger the more the forces differ.
         """
         force, power = evaluation.bond_force, self.landscape.law.power
-        if not force > 0:
+        if not evaluation.energy > 0:
             return self.size
         overlap = power * evaluation.energy / (evaluation.n_bonds * force)
         reach: float = (self.landscape.stiffness * overlap ** (power - 1) / force) ** (1 / power)
