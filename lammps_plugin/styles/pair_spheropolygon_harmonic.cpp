@@ -15,8 +15,7 @@ class PairSpheropolygonHarmonic : public PairWithSides<SpheropolygonModel> {
 
   double rim(const Vec<3> &semi_axes, int type) const override
   {
-    const SpheropolygonModel::Shape shape = *this->shape_from(semi_axes, type);
-    return shape.scale * shape.polygon->rounding;
+    return SpheropolygonModel::rim(*this->shape_from(semi_axes, type));
   }
 
  protected:

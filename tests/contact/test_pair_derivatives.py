@@ -261,9 +261,7 @@ def nearly_discs(rng, dimension):
     return deep(rng, N, dimension, overlaps(rng, N), depth=(1e2, 1e10))
 
 
-@pytest.mark.parametrize(
-    ("of", "power"), in_turn([(2, 1), (2, 2), (3, 2), (3, 1)], [2.0, 3.0])
-)  # fmt: skip
+@pytest.mark.parametrize(("of", "power"), in_turn([(2, 1), (2, 2), (3, 2), (3, 1)], [2.0, 3.0]))
 def test_second_derivatives_are_those_of_the_energy_written_a_second_time(of, power, measured):
     dimension, sides = of
     rng = np.random.default_rng([42, dimension])

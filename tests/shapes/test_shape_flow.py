@@ -15,7 +15,7 @@ from every_shape import (
     pressed,
     scattered,
     squeezed,
-)  # fmt: skip
+)
 from lammps_runs import fix_vector, loaded, state_of
 from slopes import slope_at_0
 
@@ -34,9 +34,9 @@ pytestmark = pytest.mark.lammps
 
 CASES = [*TYPICAL, *MIXTURES]
 EVERY = pytest.mark.parametrize("case", CASES, ids=str)
-PLANE, TYPICAL_IN_PLANE = (
-    pytest.mark.parametrize("case", [c for c in cases if c.dimension == 2], ids=str)
-    for cases in (CASES, TYPICAL)
+PLANE = pytest.mark.parametrize("case", [c for c in CASES if c.dimension == 2], ids=str)
+TYPICAL_IN_PLANE = pytest.mark.parametrize(
+    "case", [c for c in TYPICAL if c.dimension == 2], ids=str
 )
 
 KAPPA = 1e-3

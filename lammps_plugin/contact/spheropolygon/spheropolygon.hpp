@@ -301,6 +301,9 @@ struct SpheropolygonModel {
   {
     return 0.5 * shape.scale * shape.polygon->width;
   }
+  /// Distance from the surface to the core.
+  static double rim(const Shape &shape) { return shape.scale * shape.polygon->rounding; }
+
   template <int D> static double rotation_length(const Shape &shape)
   {
     return shape.scale * shape.polygon->farthest;

@@ -57,7 +57,7 @@ _SAME_STEP = 1.5
 _LARGEST_TILT = 0.6
 
 # Longest explicit step, in drag over stiffness of a contact. Explicit steps serve where no implicit one is found; at
-# the same error they take ten times as many evaluations.
+# the same error they take more evaluations.
 _EXPLICIT_BELOW = 1e-3
 _EXPLICIT_IN_A_ROW = 20
 _LEAST_STEP = 1e-3  # shortest explicit step, over the longest
@@ -574,7 +574,7 @@ class ImplicitFlow:
     def _falls_too_far(self, now: Evaluation, before: Evaluation) -> bool:
         # Contacts no stronger than the drag of the box motion open and close without an event.
         push = self._rate * self._least_drag * float(self.flow.state.edges.max())
-        least = self.landscape.particles.n * (push * self.size) ** 2 / self.landscape.stiffness
+        least = self.landscape.particles.n * (push * self.reach) ** 2 / self.landscape.stiffness
         return before.energy - now.energy > self.protocol.largest_drop * max(before.energy, least)
 
     @property
