@@ -83,12 +83,13 @@ template <class T> Vec<3, T> solved_symmetric(const Matrix<3, T> &a, const Vec<3
 }
 
 /// Two bodies that are both flat where they touch (face on face, tip on tip) make the matrix
-/// singular; adding this fraction of its largest element to its diagonal keeps the step finite.
+/// singular; adding this fraction of its largest element, or of `unit` if that is larger, to its
+/// diagonal keeps the step finite.
 inline constexpr double FLAT = 1e-15;
 
-template <int D, int M, class T> void lift_diagonal(Matrix<M, T> &a)
+template <int D, int M, class T> void lift_diagonal(Matrix<M, T> &a, const T &unit)
 {
-  T largest = 0.0;
+  T largest = unit;
   for (int k = 0; k < D; ++k) largest = most(largest, a.row[k][k]);
   constexpr auto SHORTER =
       std::numeric_limits<Common<T>>::epsilon() / Common<T>(std::numeric_limits<double>::epsilon());
@@ -194,7 +195,7 @@ template <int D, class S> class ByNormal {
         at.jacobian.row[a][b] = slope[a] * slope[b] + F * (i.hessian[a][b] + j.hessian[a][b]);
       }
     }
-    lift_diagonal<D>(at.jacobian);
+    lift_diagonal<D>(at.jacobian, T(0.0));
     return at;
   }
 
@@ -202,6 +203,9 @@ template <int D, class S> class ByNormal {
   {
     return solved_symmetric(at.jacobian, at.residual);
   }
+
+  /// The size of the terms of which the residual is a difference.
+  T unit(const Linearised<M, T> &) const { return norm(r); }
 
   /// Tips make the matrix nearly singular: many normals share their point.
   static constexpr bool MAY_BE_ILL_POSED = true;
@@ -256,6 +260,8 @@ template <int D, class T> class ByNormalOfEllipsoids {
     }
     return at;
   }
+
+  T unit(const Linearised<M, T> &) const { return norm(r); }
 
   static Vec<M, T> step(const Linearised<M, T> &at)
   {
@@ -358,6 +364,8 @@ template <int D, class S> class ByPointAndNormal {
 
   static Vec<M, T> step(const Linearised<M, T> &at) { return solved(at.jacobian, at.residual); }
 
+  T unit(const Linearised<M, T> &) const { return norm(r); }
+
   /// A tip determines the point and a face the normal.
   static constexpr bool MAY_BE_ILL_POSED = false;
 
@@ -407,11 +415,18 @@ template <int D, class S> class ByPoint {
       at.jacobian.row[a][D] = at.jacobian.row[D][a] = length * (i.gradient[a] + j.gradient[a]);
     }
     at.jacobian.row[D][D] = 0;
-    lift_diagonal<D>(at.jacobian);
+    lift_diagonal<D>(at.jacobian, unit(at) / length);
     return at;
   }
 
   static Vec<M, T> step(const Linearised<M, T> &at) { return solved(at.jacobian, at.residual); }
+
+  T unit(const Linearised<M, T> &at) const
+  {
+    T square = 0;
+    for (int a = 0; a < D; ++a) square += at.jacobian.row[D][a] * at.jacobian.row[D][a];
+    return sqrt(square);
+  }
 
   /// Faces leave the point undetermined, but they determine the normal.
   static constexpr bool MAY_BE_ILL_POSED = false;
@@ -455,14 +470,19 @@ template <int D, class S> class ByPoint {
   }
 };
 
-/// Newton's method with steps shortened until the residual decreases. True if a step was shorter
-/// than `tolerance` times the unknowns: that step is taken and leaves an error of its square. On
-/// request, also returns the matrix of the last step.
+/// How Newton's method ended: with a step so short that it leaves an error of its square, where the
+/// residual is rounding, which determines the unknowns only as far as the matrix does, or neither.
+enum class NewtonEnd { SHORT_STEP, ROUNDING, FAILED };
+
+/// Newton's method with steps shortened until the residual decreases. A step shorter than
+/// `tolerance` times the unknowns is taken and is the last. On request, also returns the matrix of
+/// the last step.
 template <class Equations, int M, class T>
-bool newton(const Equations &equations, Vec<M, T> &z, T tolerance, int &iterations,
-            Matrix<M, T> *matrix = nullptr)
+NewtonEnd newton(const Equations &equations, Vec<M, T> &z, T tolerance, int &iterations,
+                 Matrix<M, T> *matrix = nullptr)
 {
   constexpr int LONGEST = sizeof(T) > 8 ? 200 : 60;
+  constexpr T ROUNDING = 16 * std::numeric_limits<T>::epsilon();
   auto at = equations.linearised(z);
   T size = norm_sq(at.residual);
   for (int n = 0; n < LONGEST; ++n) {
@@ -473,24 +493,25 @@ bool newton(const Equations &equations, Vec<M, T> &z, T tolerance, int &iteratio
     if (step_sq <= tolerance * tolerance * norm_sq(z)) {
       z -= step;
       if (matrix != nullptr) *matrix = at.jacobian;
-      return true;
+      return NewtonEnd::SHORT_STEP;
     }
     T fraction = 1;
     const T smallest = T(1e-4) * std::min(T(1), T(sqrt(norm_sq(z) / step_sq)));
-    for (;; fraction *= T(0.5)) {
-      if (fraction < smallest) return false;
+    bool is_shorter = false;
+    for (; !is_shorter && fraction >= smallest; fraction *= T(0.5)) {
       const Vec<M, T> trial = z - fraction * step;
       const auto next = equations.linearised(trial);
       const T next_size = norm_sq(next.residual);
-      if (next_size <= (1 - T(0.2) * fraction) * size) {
-        z = trial;
-        at = next;
-        size = next_size;
-        break;
-      }
+      is_shorter = next_size <= (1 - T(0.2) * fraction) * size;
+      if (!is_shorter) continue;
+      z = trial;
+      at = next;
+      size = next_size;
     }
+    if (!is_shorter) break;
   }
-  return false;
+  const T rounding = ROUNDING * equations.unit(at);
+  return size <= rounding * rounding ? NewtonEnd::ROUNDING : NewtonEnd::FAILED;
 }
 
 /// The same for all lanes of a pack that are `sought`, without shortening of steps: true for those

@@ -264,6 +264,8 @@ template <class S> class ByBoth {
 
   static Vec<M, T> step(const Linearised<M, T> &at) { return solved(at.jacobian, at.residual); }
 
+  static T unit(const Linearised<M, T> &) { return T(1); }
+
   /// Faces leave points, and tips normals, undetermined, but each determines the other.
   static constexpr bool MAY_BE_ILL_POSED = false;
 

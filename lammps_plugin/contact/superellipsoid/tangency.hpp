@@ -301,7 +301,7 @@ template <int D, class T> class TangencySearch {
     const T most = ratio > 1.0 ? largest * T(1 - 1e-9) : T(1);
     for (T reached = T(ratio); reached < most; reached *= T(ratio)) ++last;
     Vec<Equations::M, T> z{};
-    bool is_converged = false;
+    detail::NewtonEnd end{};
     for (int stage = 1; stage <= last; ++stage) {
       const T share = T(stage) / last;
       const Equations equations(
@@ -309,15 +309,14 @@ template <int D, class T> class TangencySearch {
                                         stage < last ? between(e_j, share) : e_j});
       if (stage == 1) z = equations.start(found.at);
       detail::Matrix<Equations::M, T> matrix{};
-      is_converged =
-          newton(equations, z, stage < last ? ROUGH : TOLERANCE, found.iterations, &matrix);
+      end = newton(equations, z, stage < last ? ROUGH : TOLERANCE, found.iterations, &matrix);
       if (stage < last) continue;
       found.at = equations.tangency(z);
-      found.is_settled = is_converged;
+      found.is_settled = end == detail::NewtonEnd::SHORT_STEP;
       if constexpr (Equations::MAY_BE_ILL_POSED)
-        found.is_settled = is_converged && Equations::is_well_posed(matrix);
+        found.is_settled = found.is_settled && Equations::is_well_posed(matrix);
     }
-    return is_converged;
+    return end != detail::NewtonEnd::FAILED;
   }
 
   static Powers<T> between(const Powers<T> &powers, T share)
