@@ -26,6 +26,7 @@ _GOOD_TO_MOVE = 1e-4
 _SLIDING = 1e-5
 
 _MOST_MINIMA = 60  # on the way to u0
+_MOST_STALLS = 6  # in a row at u0 without a smaller residual
 _GAIN = 1.5  # relaxation of the tolerance after a stall that leaves only sliding
 _NEAR = 0.1  # relative distance of the root of u to its target below which minima have the full tolerance
 _TRIES = 2  # fractions of a strain to try where the whole one unjams the packing
@@ -354,6 +355,8 @@ class Leading:
         Residual and energy density to reach.
     n_minima
         Minimisations of this approach.
+    least, stalls
+        Smallest residual of this approach at u0, and how many stalled since.
     """
 
     start: Minimum
@@ -366,12 +369,15 @@ class Leading:
     tolerance: float = 0.0
     aim: float = 0.0
     n_minima: int = 0
+    least: float | None = None
+    stalls: int = 0
 
     def advance(self, landscape: Landscape, target: Target) -> Minimum | None:
         """Minimise once; return the minimum at u0, or an unjammed one if the energy vanishes on the way."""
         if self.is_new:
             self.jammed = _relaxed(landscape, self.jammed, target, self.jammed.energy_density)
             self.is_new, self.part, self.tries, self.n_minima = False, 1.0, 1, 0
+            self.least, self.stalls = None, 0
             self.tolerance, self.aim = target.tolerance, target.u0
             lost = self.jammed if self.jammed.outcome is Outcome.UNJAMMED else None
         else:
@@ -398,9 +404,13 @@ class Leading:
 
     def _is_there(self, target: Target) -> bool:
         """Whether the approach has ended; if not, adapt the next step."""
-        if self.n_minima == _MOST_MINIMA:
-            return True
         left, u = self.jammed.residual.largest, self.jammed.energy_density
+        if self.least is None or left < self.least or not target.is_met(u):
+            self.least, self.stalls = left, 0
+        elif self.jammed.outcome is Outcome.STALLED:
+            self.stalls += 1
+        if self.n_minima == _MOST_MINIMA or self.stalls == _MOST_STALLS:
+            return True
         if self.jammed.outcome is Outcome.STALLED and left < _SLIDING:
             self.tolerance = max(self.tolerance, _GAIN * left)  # the next ones need not be better
         if left <= self.tolerance and target.is_met(u):
