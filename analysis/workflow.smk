@@ -88,11 +88,11 @@ def add_sweep(group, options, chunk):
     return files
 
 
-def modes_of(files, group):
+def modes_of(files, group, options=""):
     """Write a loop over packings that finds the modes of each; one that is not there, or no minimum, has none."""
     return (
         f"mkdir -p modes/{group}; for f in {files}; do if [ -f $f ]; then"
-        f" jamshape modes $f --out modes/{group}/$(basename $f .h5).modes.h5 || true; fi; done"
+        f" jamshape modes $f{options} --out modes/{group}/$(basename $f .h5).modes.h5 || true; fi; done"
     )
 
 

@@ -43,7 +43,8 @@ add_modes(
     {job: paths for job, paths in SWEEP.items() if any(f"/alpha{a:g}_" in paths[0] for a in OF_MODES)},
 )
 
-# The same packings at other energies, Figs. 14, 18 and 20; those that are not reached are left out.
+# The same packings at other energies, Figs. 14, 18 and 20; those that are not reached are left out. Their modes are found
+# with all bonds and without those that graze.
 for alpha in OF_MODES[1:]:
     for packing in packings(alpha, AT["ladder_samples"]):
         ladder, name = f"ladder/alpha{alpha:g}", Path(packing).stem
@@ -53,6 +54,12 @@ for alpha in OF_MODES[1:]:
             f'python "$analysis/energy_ladder.py" {packing} --u0 {words(AT["ladder_u0"])} --out {ladder} || true;'
             f" {modes_of(f'{ladder}/{name}_*.h5', 'ladder')}",
             after=[f"rods_alpha{alpha:g}"],
+        )
+        add(
+            "bearing",
+            f"bearing_{name}",
+            modes_of(f"{ladder}/{name}_*.h5", "bearing", " --least-force 1e-6"),
+            after=["ladder"],
         )
 
 # And compressed by equal steps, for lines through a pressure without a rate, and opened again.
@@ -146,8 +153,9 @@ for number, alpha, largest in ((14, 0.01, 1e-12), (18, 4, 1)):
     shown = [u0 for u0 in AT["ladder_u0"] if U0 <= float(u0) <= largest]
     asked = ("modes/ladder --alpha", alpha)
     draw(f"fig{number}a", "fig11a_density_of_states", *asked, "--u0", shown, after=["ladder"])
-    draw(f"fig{number}b", "fig14_band_frequency", *asked, after=["ladder"])
-draw("fig20", "fig14_band_frequency", "modes/ladder --alpha 1", after=["ladder"])
+for name, alpha in (("fig14b", 0.01), ("fig18b", 4), ("fig20", 1)):
+    for group, suffix in (("ladder", ""), ("bearing", "_bearing")):
+        draw(f"{name}{suffix}", "fig14_band_frequency", f"modes/{group} --alpha", alpha, after=[group])
 LADDERS = [f"ladder/alpha{alpha:g}" for alpha in OF_MODES[1:]]
 draw("fig14_jamming_distance", "fig14_jamming_distance", LADDERS, after=["ladder"])
 
