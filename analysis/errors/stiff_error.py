@@ -185,7 +185,7 @@ def parser() -> ArgumentParser:
     add("--phi-from", type=float, default=0.845)
     add("--phi-to", type=float, default=0.87)
     add("--method", choices=METHODS, default="tr-bdf2")
-    add("--seconds", type=float, default=math.inf, help="for one run, at most")
+    add("--seconds", type=float, default=1e9, help="for one run, at most")
     add("--quick", action="store_true", help="N = 32, two rates, under a minute")
     return found
 

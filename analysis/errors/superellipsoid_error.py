@@ -234,7 +234,7 @@ def parser() -> ArgumentParser:
     """Make the parser of the command line."""
     found = parser_of(__doc__, "runs/superellipsoid_error")
     found.add_argument("--n", type=int, default=1_000_000, help="pairs, in blocks of 5000")
-    found.add_argument("--seconds", type=float, default=np.inf, help="begin no block after these")
+    found.add_argument("--seconds", type=float, default=1e9, help="begin no block after these")
     found.add_argument("--judged", type=int, default=200, help="pairs that mpmath solves as well")
     found.add_argument("--seed", type=int, default=1)
     return found

@@ -18,6 +18,7 @@ from code_blocks import ROOT
 from lammps_runs import MPIRUN, run_program
 from sessions import make_clone, make_programs
 
+from jamshape.checks import require_options
 from jamshape.commands import COMMANDS, main, options_of
 
 OURS = ("analysis/", "docs/", "inputs/", "pyscripts/", "tests/")
@@ -125,9 +126,11 @@ def check_python(place, words):
 
 @functools.cache
 def check_script(words):
-    """Start a script until its command line is parsed."""
+    """Start a script until its command line is parsed, and numbers are in their ranges."""
     with (
-        mock.patch("jamshape.command.run", lambda parser, _: parser.parse_args()),
+        mock.patch(
+            "jamshape.command.run", lambda parser, _: require_options(vars(parser.parse_args()))
+        ),
         mock.patch("jamshape.commands.start", lambda name: check_jamshape([name, *words[1:]])),
     ):
         parsed(lambda: start_script(ROOT / words[0], words[1:]), words)
