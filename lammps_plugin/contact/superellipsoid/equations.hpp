@@ -470,8 +470,8 @@ template <int D, class S> class ByPoint {
   }
 };
 
-/// End of Newton's method: a step so short that it leaves an error of its square, a residual that is
-/// rounding, which determines the unknowns only as far as the matrix does, or neither.
+/// End of Newton's method: a step so short that it leaves an error of its square, a residual that
+/// is rounding, which determines the unknowns only as far as the matrix does, or neither.
 enum class NewtonEnd { SHORT_STEP, ROUNDING, FAILED };
 
 /// Newton's method with steps shortened until the residual decreases. A step shorter than
