@@ -449,3 +449,18 @@ def test_nothing_depends_on_the_unit_of_length(factor):
     np.testing.assert_allclose(large["energy"], small["energy"], rtol=1e-12)
     scale = np.abs(small["force"]).max(1, keepdims=True)
     np.testing.assert_allclose(large["force"] * factor / scale, small["force"] / scale, atol=1e-9)
+
+
+@pytest.mark.parametrize("p", [1.5, 2.0, 3.0, 8.0])
+def test_faces_along_each_other_take_few_steps(p):
+    """Their equations have a root of multiplicity 2p - 1 there."""
+    tilt, shift = (a.ravel() for a in np.meshgrid([0, 1e-15, 1e-12, 1e-8], [0, 1e-8, 1e-3, 0.1]))
+    ones = np.ones_like(tilt)
+    i = np.stack([shift, 1.999 * ones, tilt, ones, ones, p * ones], axis=1)
+    j = np.stack([0 * ones, 0 * ones, 0 * ones, ones, ones, p * ones], axis=1)
+    found = _contact.superellipsoid_scales(i, j)
+    assert (
+        found["iterations"].max() < 50
+    )  # hundreds, and the fallback, if steps are judged by their length alone
+    assert found["gap"].max() < ROUNDING
+    np.testing.assert_allclose(found["eta"], 1.999 / 2, rtol=1e-4)

@@ -1,6 +1,7 @@
 import math
 from copy import deepcopy
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,15 @@ from jamshape.contacts import coordination, find_contacts
 from jamshape.landscape import Landscape
 from jamshape.minima import History, Outcome, minimise, residual_of
 from jamshape.minima.checkpoints import search_of, told_search
-from jamshape.minima.target import Search, Target, TargetError, bisection, extrapolation, find
+from jamshape.minima.target import (
+    Leading,
+    Search,
+    Target,
+    TargetError,
+    bisection,
+    extrapolation,
+    find,
+)
 
 # n, alpha, and the packing fraction just below jamming where the search begins
 STARTS = {"16 discs": (16, 0, 0.77), "32 discs": (32, 0, 0.815), "16 rods": (16, 1, 0.86)}
@@ -250,3 +259,22 @@ def test_target_is_met_within_its_accuracy():
     target = Target(1e-12, accuracy=1e-3)
     assert [target.is_met(1e-12 * x) for x in (1, 1.0009, 0.9991)] == [True] * 3
     assert [target.is_met(1e-12 * x) for x in (1.0011, 0.9989, 0, math.nan)] == [False] * 4
+
+
+def stalled(residual, u):
+    """A minimum with what an approach to u0 looks at."""
+    return SimpleNamespace(
+        outcome=Outcome.STALLED, residual=SimpleNamespace(largest=residual), energy_density=u
+    )
+
+
+def test_an_approach_ends_where_minimisations_stall_alike():
+    target, way = Target(u0=1e-12), Leading(None, None, tolerance=1e-8, aim=1e-12)
+    falling = [0.5, 0.4, 0.3]
+    seen = []
+    for residual in [*falling, *10 * [0.3]]:
+        way.jammed = stalled(residual, 1e-12)
+        seen.append(way._is_there(target))
+    assert seen.index(True) == len(falling) + 5
+    way.jammed = stalled(0.3, 2e-12)  # another energy, not yet there
+    assert not way._is_there(target)
