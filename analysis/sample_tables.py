@@ -53,7 +53,7 @@ SHEAR = (
     *SHAPE, "phi", "gdot", "flow", "integrator", "strain", "startup",
     *STEADY, *(f"{name}_error" for name in STEADY),
 )  # fmt: skip
-AT_PRESSURE = ("G", "slope", "n_bonds", "phi")
+AT_PRESSURE = ("G", "slope")
 
 
 def told_packing(path: Path) -> dict[str, Any]:

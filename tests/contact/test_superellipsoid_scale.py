@@ -459,8 +459,7 @@ def test_faces_along_each_other_take_few_steps(p):
     i = np.stack([shift, 1.999 * ones, tilt, ones, ones, p * ones], axis=1)
     j = np.stack([0 * ones, 0 * ones, 0 * ones, ones, ones, p * ones], axis=1)
     found = _contact.superellipsoid_scales(i, j)
-    assert (
-        found["iterations"].max() < 50
-    )  # hundreds, and the fallback, if steps are judged by their length alone
+    # Judged by the length of steps alone, the search took hundreds of them, and its fallback.
+    assert found["iterations"].max() < 50
     assert found["gap"].max() < ROUNDING
     np.testing.assert_allclose(found["eta"], 1.999 / 2, rtol=1e-4)
