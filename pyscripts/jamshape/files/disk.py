@@ -219,4 +219,13 @@ def _is_alive(pid: int) -> bool:
         return False
     except (PermissionError, OverflowError):
         return True
-    return True
+    return not _has_ended(pid)
+
+
+def _has_ended(pid: int) -> bool:
+    """Recognise a process that has ended and that nobody has waited for, which may stay in a container."""
+    try:
+        stat = Path(f"/proc/{pid}/stat").read_text()
+    except OSError:  # gone meanwhile, or a system without /proc
+        return False
+    return stat.rpartition(")")[2].split()[0] in {"Z", "X"}

@@ -158,18 +158,40 @@ def test_a_link_that_takes_the_place_of_a_temporary_file_is_not_followed(path):
     assert names(path) == ["other"]
 
 
+# --- leftovers -----------------------------------------------------------------------------------
+
+
+def left_by(pid, path):
+    """Name a temporary file of another process."""
+    with replacing(path) as temporary:
+        name = temporary.name.replace(f".{os.getpid()}.", f".{pid}.")
+    path.unlink()
+    return path.with_name(name)
+
+
 def test_links_among_leftovers_are_removed_and_not_followed(path):
     with subprocess.Popen(["true"]) as ended:
         pass
     other = path.with_name("other")
     other.write_bytes(b"to be kept")
-    with replacing(path) as temporary:
-        left = temporary.name.replace(f".{os.getpid()}.", f".{ended.pid}.")
-    path.unlink()
-    path.with_name(left).symlink_to(other)
+    left_by(ended.pid, path).symlink_to(other)
     remove_leftovers(path)
     assert names(path) == ["other"]
     assert other.read_bytes() == b"to be kept"
+
+
+def test_leftovers_of_a_process_that_nobody_waits_for_are_removed(path):
+    """The first process of a container may wait late or never for those of a killed run."""
+    process = subprocess.Popen(["sleep", "100"])
+    left = left_by(process.pid, path)
+    left.touch()
+    remove_leftovers(path)
+    assert left.exists()
+    process.kill()
+    os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)  # and it stays as it is
+    remove_leftovers(path)
+    assert not left.exists()
+    process.wait()
 
 
 # --- syncs ---------------------------------------------------------------------------------------
