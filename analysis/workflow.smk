@@ -133,11 +133,16 @@ def chosen_figures():
     return asked
 
 
+def figure_reports(_):
+    """List the last lines of what draws the figures."""
+    return [f"figures/{name}.json" for name in chosen_figures()]
+
+
 def everything(_):
-    """List the page and the reports of all jobs: of these, too, since Snakemake makes what lies between again only if asked."""
+    """List the page, the figures and the reports of all jobs: Snakemake makes what lies before the page again only if asked."""
     needed = [name for figure in chosen_figures() for name in before(FIGURES[figure])]
     names = dict.fromkeys(needed) if config.get("figures") else JOBS
-    return ["agreement.md", *(str(report_of(name)) for name in names)]
+    return ["agreement.md", *figure_reports(None), *(str(report_of(name)) for name in names)]
 
 
 def before(job):
@@ -173,7 +178,7 @@ wildcard_constraints:
 
 rule page:
     input:
-        lambda _: [f"figures/{name}.json" for name in chosen_figures()],
+        figure_reports,
     output:
         "agreement.md",
         "agreement.csv",

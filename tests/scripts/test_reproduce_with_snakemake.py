@@ -222,6 +222,10 @@ def test_what_is_there_is_not_made_again_and_what_was_removed_is(reproduce, tmp_
     after = [path.stat().st_mtime_ns for path in packings]
     assert after[0] == before[0]
     assert after[1] > before[1]
+    figure = tmp_path / "made" / "figures" / "fig02.json"
+    figure.unlink()
+    assert reproduce(lines)[0] == 0
+    assert figure.exists()
 
 
 def test_a_sample_that_cannot_be_made_is_listed_and_stops_nothing(reproduce, tmp_path):
