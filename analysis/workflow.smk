@@ -89,10 +89,12 @@ def add_sweep(group, options, chunk):
 
 
 def modes_of(files, group, options=""):
-    """Write a loop over packings that finds the modes of each; one that is not there, or no minimum, has none."""
+    """Write a loop over packings that finds the modes of each that has none yet; what is no minimum has none."""
+    modes = f"modes/{group}/$(basename $f .h5).modes.h5"
     return (
-        f"mkdir -p modes/{group}; for f in {files}; do if [ -f $f ]; then"
-        f" jamshape modes $f{options} --out modes/{group}/$(basename $f .h5).modes.h5 || true; fi; done"
+        f"mkdir -p modes/{group}; for f in {files}; do if [ $f -nt {modes} ]; then"
+        f" jamshape modes $f{options} --out {modes} || true; fi; done;"
+        f""" echo '{{"modes": '$(ls modes/{group} | wc -l)'}}'"""
     )
 
 

@@ -208,21 +208,28 @@ def test_a_job_that_fails_is_told_and_the_others_go_on(reproduce, tmp_path):
 
 def test_what_is_there_is_not_made_again_and_what_was_removed_is(reproduce, tmp_path):
     lines = (
-        'add_sweep("rods", "--alpha 1 --samples 2 --n 16 --phi-start 0.55 --u0 1e-6", 1)\n'
-        f'figure("fig02", "", (), ["rods"], {picture("fig02")})\n'
+        'made = add_sweep("rods", "--alpha 1 --samples 2 --n 16 --phi-start 0.55 --u0 1e-6", 1)\n'
+        'add_modes("modes", "rods", made)\n'
+        f'figure("fig02", "", (), ["modes"], {picture("fig02")})\n'
     )
     assert reproduce(lines)[0] == 0
-    packings = [tmp_path / "made" / "packings" / "rods" / f"alpha1_seed{k}.h5" for k in (1, 2)]
-    before = [path.stat().st_mtime_ns for path in packings]
-    drawn = (tmp_path / "made" / "figures" / "fig02.png").stat().st_mtime_ns
+    made = tmp_path / "made"
+    packings = [made / "packings" / "rods" / f"alpha1_seed{k}.h5" for k in (1, 2)]
+    modes = [made / "modes" / "modes" / f"alpha1_seed{k}.modes.h5" for k in (1, 2)]
+
+    def times():
+        return [[path.stat().st_mtime_ns for path in paths] for paths in (packings, modes)]
+
+    before = times()
+    drawn = (made / "figures" / "fig02.png").stat().st_mtime_ns
     assert reproduce(lines)[0] == 0
-    assert (tmp_path / "made" / "figures" / "fig02.png").stat().st_mtime_ns == drawn
+    assert (made / "figures" / "fig02.png").stat().st_mtime_ns == drawn
     packings[1].unlink()
     assert reproduce(lines)[0] == 0
-    after = [path.stat().st_mtime_ns for path in packings]
-    assert after[0] == before[0]
-    assert after[1] > before[1]
-    figure = tmp_path / "made" / "figures" / "fig02.json"
+    for old, new in zip(before, times(), strict=True):
+        assert new[0] == old[0]
+        assert new[1] > old[1]
+    figure = made / "figures" / "fig02.json"
     figure.unlink()
     assert reproduce(lines)[0] == 0
     assert figure.exists()
