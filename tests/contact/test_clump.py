@@ -409,7 +409,7 @@ def second(found):
 
 def test_the_outline_encloses_the_area():
     rng = np.random.default_rng(12)
-    diameters, form = random_bodies(rng, 2, 12)
+    diameters, form = random_bodies(rng, 2, 5)
     area = SHAPE.compiled((diameters, form), 2, js.Interaction()).measure
     for d, f, expected in zip(diameters, form, area, strict=True):
         x, y = SHAPE.outline(d, f, 4000).T
