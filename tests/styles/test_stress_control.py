@@ -96,8 +96,8 @@ PACKINGS = {
     "discs": lambda: dense(alpha=0.0, n=32, phi=0.9),
     "rods": lambda: dense(n=24, phi=0.95),
     "spheres": lambda: dense(3, alpha=0.0, n=32, phi=0.7),
-    "ellipsoids": lambda: crowd(3, kinds=(1,)),
-    "superellipsoids": lambda: crowd(3),
+    "ellipsoids": lambda: crowd(3, kinds=(1,), n=24),
+    "superellipsoids": lambda: crowd(3, n=24),
 }
 
 
