@@ -83,7 +83,7 @@ def lonely_particles(dimension, edge):
                    image=image)  # fmt: skip
 
 
-FAST, SLOW = (np.log(10) / 20, 2000), (5e-10, 20_000)  # rates and numbers of steps
+FAST, SLOW = (np.log(10) / 20, 2000), (2e-10, 50_000)  # rates and numbers of steps
 LONELY = [("rods", FAST), ("rods", SLOW), ("superellipsoids", SLOW), ("superellipsoids", FAST)]
 
 
