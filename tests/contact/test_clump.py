@@ -92,7 +92,7 @@ def as_in_space(torque):
 # --- energies ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("n", [4000, pytest.param(100_000, marks=pytest.mark.validate)])
+@pytest.mark.parametrize("n", [2000, pytest.param(100_000, marks=pytest.mark.validate)])
 @IN_BOTH
 def test_a_contact_is_the_sum_over_pairs_of_discs(dimension, n, measured):
     pairs = pairs_of(n, dimension)
