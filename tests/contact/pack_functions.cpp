@@ -25,7 +25,7 @@ template <class OfPack, class OfNumber, class Draw>
 double largest_error(const OfPack &of_pack, const OfNumber &of_number, const Draw &draw)
 {
   double largest = 0.0;
-  for (int n = 0; n < 300000; ++n) {
+  for (int n = 0; n < 50000; ++n) {
     double x[LANES], y[LANES];
     for (double &each : x) each = draw();
     of_pack(Pack::load(x)).store(y);

@@ -45,7 +45,7 @@ from thinned import in_turn
 
 K_E = 1.7
 ALPHA = 1e-3, 100.0
-N = 400
+N = 200
 
 
 # --- classes -----------------------------------------------------------------------------------
@@ -267,7 +267,7 @@ def test_second_derivatives_are_those_of_the_energy_written_a_second_time(of, po
     rng = np.random.default_rng([42, dimension])
     cases = [case for case, D, s in CASES if (D, s) == (dimension, sides)]
     cases += [nearly_discs] * (sides == 2)  # within |sin| = 1e-8, one bond has a kink
-    packing = PairPacking.of(rng, concatenated(*(case(rng, dimension)[:40] for case in cases)))
+    packing = PairPacking.of(rng, concatenated(*(case(rng, dimension)[:15] for case in cases)))
     packing = replace(packing, power=power)
 
     def gradient(packing):

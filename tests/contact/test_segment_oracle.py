@@ -25,7 +25,7 @@ from spherocylinder_pairs import (
 
 from jamshape import _contact
 
-PER_CASE = 1000
+PER_CASE = 500
 
 
 def distances(pairs):

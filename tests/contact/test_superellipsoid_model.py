@@ -103,7 +103,7 @@ def moved_a_little(rng, bodies, amplitude):
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_no_point_of_a_body_moves_farther_than_its_bound(dimension, measured):
     rng = np.random.default_rng(31)
-    n = 5000
+    n = 1000
     then = random_bodies(rng, n, dimension, rng.choice(EXPONENTS, n))
     now = moved_a_little(rng, then, 10.0 ** rng.uniform(-6, 0, n))
     bound = np.sqrt(_contact.superellipsoid_motion_sq(then.rows, now.rows))

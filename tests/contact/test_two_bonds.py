@@ -39,7 +39,7 @@ from thinned import in_turn
 
 # --- smooth paths through contact --------------------------------------------------------------
 
-N_PATHS = 250
+N_PATHS = 100
 GRID = np.linspace(0.0, 1.0, 801)
 WORST_INTERVALS = 24
 HALVINGS = 36  # leaves a path step of 1.8e-14 of a path that moves rods by their own size

@@ -21,7 +21,8 @@ def on_ranks(ranks, packing, drive, sides, folder):
 
 
 @extreme("change of poses and forces", [
-    case(f"two ranks: {shape.name}, {name}", drive, shape.laws[-1].sides)
+    # Particles that touch their own images are on two ranks in tests/styles/test_pair_styles.py, too.
+    case(f"two ranks: {shape.name}, {name}", drive, shape.laws[-1].sides, heavy=name == "own images")
     for shape in SHAPES for name, drive in shape.two_ranks.items()
 ], 1e-12)  # fmt: skip
 def test_two_ranks(drive, sides, tmp_path):

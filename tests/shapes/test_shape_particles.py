@@ -17,6 +17,7 @@ from every_shape import (
     particles_of,
     scattered,
 )
+from scipy.spatial import cKDTree
 
 from jamshape.contacts import find_contacts, find_rattlers
 from jamshape.packing import Packing
@@ -167,10 +168,12 @@ def test_outlines_have_the_area_and_the_moment_of_the_particle(case, measured):
     assert np.max(off[1]) < np.max(off[0]) / 4
 
 
-def is_there_and_back(ends, k):
-    """Whether a step of an outline is also taken the other way round."""
-    back = np.abs(ends[::-1] - ends[:, k : k + 1]).max(axis=(0, 2))
-    return bool((back < 1e-9).any())
+def are_there_and_back(outline):
+    """Whether each step of an outline is also taken the other way round."""
+    after = np.roll(outline, -1, axis=0)
+    there, back = np.hstack([outline, after]), np.hstack([after, outline])
+    nearest, _ = cKDTree(back).query(there, p=np.inf)
+    return nearest < 1e-9
 
 
 @pytest.mark.parametrize("case", [c for c in PURE if c.dimension == 2], ids=str)
@@ -182,9 +185,7 @@ def test_perimeter_and_asphericity_are_those_of_the_outline(case, measured):
         outline = shape.outline(*body, points)
         chords = np.linalg.norm(np.roll(outline, -1, axis=0) - outline, axis=1)
         # Long ones are straight sides, or lead from one closed curve to another and back.
-        ends = np.stack([outline, np.roll(outline, -1, axis=0)])
-        bridge = np.array([is_there_and_back(ends, k) for k in range(len(outline))])
-        off.append(1 - chords[~bridge].sum() / length)
+        off.append(1 - chords[~are_there_and_back(outline)].sum() / length)
     measured(perimeter=off[1])
     # Chords are shorter than arcs, by the square of their length.
     assert 0 <= off[1] < 1e-4
@@ -227,14 +228,23 @@ def test_surfaces_are_closed_and_have_the_volume_and_the_moments(case, measured)
     assert np.max(off[1]) < np.max(off[0]) / 4
 
 
+def numbers_of(rows):
+    """(M,) numbers of rows, the same for equal ones."""
+    order = np.lexsort(rows.T)
+    differs = (rows[order][1:] != rows[order][:-1]).any(axis=1)
+    found = np.empty(len(rows), int)
+    found[order] = np.cumsum(np.append(0, differs))
+    return found
+
+
 def assert_closed(mesh):
     """Each edge of a triangle is one of another, the other way round."""
-    _, which = np.unique(np.round(mesh.vertices, 9) + 0.0, axis=0, return_inverse=True)
-    triangles = which.ravel()[mesh.triangles]
+    triangles = numbers_of(np.round(mesh.vertices, 9) + 0.0)[mesh.triangles]
     whole = triangles[(triangles != np.roll(triangles, 1, axis=1)).all(axis=1)]
     edges = np.concatenate([whole[:, [0, 1]], whole[:, [1, 2]], whole[:, [2, 0]]])
-    there, counts = np.unique(edges, axis=0, return_counts=True)
-    back, others = np.unique(edges[:, ::-1], axis=0, return_counts=True)
+    ends = len(mesh.vertices) * edges + edges[:, ::-1]  # in one number
+    there, counts = np.unique(ends[:, 0], return_counts=True)
+    back, others = np.unique(ends[:, 1], return_counts=True)
     np.testing.assert_array_equal(there, back)
     np.testing.assert_array_equal(counts, others)
 

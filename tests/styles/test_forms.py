@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from lammps_runs import before_box, error_of, load_plugin, run_lmp, run_lmp_well, scene
 from pair_scenes import packing_of
+from thinned import in_turn
 
 pytestmark = pytest.mark.lammps
 
@@ -26,8 +27,7 @@ def shown(done):
     return re.search(r"PotEng.*\n(.*)", done)[1].split()
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(("name", "ranks"), in_turn(CASES, [2, 1]))
 def test_numbers_in_a_file_are_those_in_the_line(name, ranks, tmp_path):
     text = f"{load_plugin()}\n{scene(packing_of(name), tmp_path / 's.data')}"
     lines, n_files = [], 0
@@ -109,13 +109,13 @@ def test_energy_is_conserved_by_motion_with_inertia(exponents, tmp_path, measure
             f"""
             {before_box(3)}
             {load_plugin()}
-            create_random superellipsoid 40 0.3 3 type 1 1 1 1.4 form {exponents}
+            create_random superellipsoid 16 0.3 3 type 1 1 1 1.4 form {exponents}
             pair_style superellipsoid/harmonic
             pair_coeff 1 1 1.0 {exponents}
             velocity all create 0.02 7 loop all
             fix motion all nve/asphere
             compute turn all erotate/asphere
-            timestep {8.0 / steps}
+            timestep {2.0 / steps}
             thermo {steps // 40}
             thermo_style custom step pe ke c_turn
             thermo_modify format float %.17g norm no
@@ -130,7 +130,7 @@ def test_energy_is_conserved_by_motion_with_inertia(exponents, tmp_path, measure
         assert spin[-1] > 1e-2 * total[0]  # and turn
         return np.ptp(total) / total[0]
 
-    coarse, fine = fluctuation(1600), fluctuation(25600)
+    coarse, fine = fluctuation(400), fluctuation(6400)
     measured(coarse=coarse, fine=fine)
     assert fine < 2e-5
     assert fine < coarse / 8

@@ -28,8 +28,8 @@ SCENES = {
     "rods": lambda seed=1: dense(n=32, phi=0.95, seed=seed),
     "short rods": lambda seed=1: dense(alpha=1.0, n=32, phi=0.95, seed=seed),
     "discs": lambda seed=1: dense(alpha=0.0, n=32, phi=0.88, seed=seed),
-    "rods 3d": lambda seed=1: dense(3, alpha=2.0, n=32, phi=0.72, seed=seed),
-    "mixture 3d": lambda seed=1: dense_mixture(3, n=32, phi=0.72, seed=seed),
+    "rods 3d": lambda seed=1: dense(3, alpha=2.0, n=16, phi=0.72, seed=seed),
+    "mixture 3d": lambda seed=1: dense_mixture(3, n=16, phi=0.72, seed=seed),
 }
 # Overlaps far above A^2/d for some: their side-to-side contacts have kinks.
 NEARLY_ROUND = {
@@ -84,7 +84,7 @@ def test_cg_relaxes_positions_and_orientations(name, tmp_path, measured):
 )
 def test_cg_relaxes_superellipsoids(dimension, kinds, phi, tmp_path, measured):
     """In two goes: LAMMPS's line search may repeat a step that changes no energy, until it begins anew."""
-    packing = crowd(dimension, kinds, n=24, phi=phi, spread=0.3)
+    packing = crowd(dimension, kinds, n=16, phi=phi, spread=0.3)
     with loaded(packing, tmp_path, k_e=1.7) as session:
         session.commands("""
             compute packing all packing

@@ -56,7 +56,10 @@ def level_set_mesh(
     origin = number[:-1, :-1, :-1][near]
     four = (origin[:, None, None] + (_TETRAHEDRA @ stride)[None]).reshape(-1, 4)
     edges = _cut_edges(four, value)
-    ends, which = np.unique(np.sort(edges.reshape(-1, 2), axis=1), axis=0, return_inverse=True)
+    # One number for both ends of an edge, which is sorted in a fraction of the time of two.
+    low, high = np.sort(edges.reshape(-1, 2), axis=1).T
+    both, which = np.unique(low * len(value) + high, return_inverse=True)
+    ends = np.column_stack(np.divmod(both, len(value)))
     triangles = which.reshape(-1, 3)
     points = (corner + cell * grid).reshape(-1, 3)
     a, b = (points[ends[:, k]] for k in (0, 1))
