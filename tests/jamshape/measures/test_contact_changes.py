@@ -14,7 +14,7 @@ from jamshape.checks import NotReachedWarning
 from jamshape.landscape import State
 from jamshape.measures.contact_changes import At, Search, contact_changes
 
-VALUES = (1e-5, 1e-6, 1e-7, 1e-5)
+VALUES = (1e-5, 1e-6, 1e-7, 1e-4)
 
 
 @pytest.fixture(scope="module")
