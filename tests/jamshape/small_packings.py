@@ -78,7 +78,7 @@ def second_order(matrix):
     return abs(matrix.prestress).max() ** 2
 
 
-def synthetic(n=48, m=40, size=1e-8, n_sliding=2, seed=0):
+def synthetic(n=36, m=30, size=1e-8, n_sliding=2, seed=0):
     """M = C^T C - S with null modes of C, some of which S moves in second order only."""
     rng = np.random.default_rng(seed)
     C = rng.normal(size=(m, n)) / np.sqrt(n)
