@@ -28,9 +28,10 @@ def wave(run):
     return run.about["amplitude"] * unit
 
 
-@pytest.mark.parametrize("flow", ["simple", "pure"])
-@pytest.mark.parametrize("how", [{"dt": 0.07}, {"integrator": "rkc2"}], ids=["heun", "rkc2"])
-@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize(
+    ("dimension", "how", "flow"),
+    in_turn([2, 3], [{"dt": 0.07}, {"integrator": "rkc2"}], ["simple", "pure"]),
+)
 def test_the_strain_is_a_triangle_and_the_box_returns_to_the_last_bit(
     dimension, how, flow, tmp_path, measured
 ):
@@ -58,8 +59,7 @@ def test_a_box_that_takes_other_cell_vectors_returns(flow, tmp_path):
     np.testing.assert_allclose(run.packing(-1).box.matrix, run.packing(0).box.matrix, atol=1e-13)
 
 
-@pytest.mark.parametrize("flow", ["simple", "pure"])
-@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize(("dimension", "flow"), in_turn([2, 3], ["simple", "pure"]))
 def test_particles_without_contacts_return_to_their_places(dimension, flow, tmp_path, measured):
     """The host carries them back; rods turn back by the same equation, to the error of the steps."""
     particles = {2: RODS, 3: BODIES}[dimension]

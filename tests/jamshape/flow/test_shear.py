@@ -44,7 +44,7 @@ def test_a_lonely_rod_turns_as_the_closed_form_says(tmp_path):
     """PHYSICS C: the period is 2 pi / (gdot sqrt(1 - c^2)); over whole periods S_2 is (1 - sqrt(1 - c^2)) / c."""
     rod = js.Spherocylinders(alpha=1)
     one = js.shear(
-        rod, n=1, phi=1e-3, gdot=1e-2, strain=0.1, file=tmp_path / "a.h5", progress=False
+        rod, n=1, phi=1e-3, gdot=1e-2, strain=0.1, rows=4, file=tmp_path / "a.h5", progress=False
     )
     body = one.packing(0)
     a, r = (
@@ -57,7 +57,7 @@ def test_a_lonely_rod_turns_as_the_closed_form_says(tmp_path):
     c = (along - across) / (along + across)
     root = np.sqrt(1 - c**2)
     period = 2 * np.pi / root
-    run = js.shear(rod, n=1, phi=1e-3, gdot=1e-2, strain=2 * period, rows=1000, file=tmp_path / "b.h5",
+    run = js.shear(rod, n=1, phi=1e-3, gdot=1e-2, strain=4 * period, rows=4000, file=tmp_path / "b.h5",
                    integration_tolerance=1e-8, progress=False)  # fmt: skip
     found = run.steady(after=0.0)
     assert found["rotation"].value == pytest.approx(root / 2, rel=1e-6)
