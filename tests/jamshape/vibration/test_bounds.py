@@ -10,7 +10,7 @@ from functools import partial
 import mpmath
 import numpy as np
 import pytest
-from squeezed import quickly_squeezed
+from squeezed import squeezed
 
 import jamshape as js
 from jamshape.landscape import Landscape, State
@@ -132,7 +132,7 @@ PHI = {0.01: 0.77, 1: 0.86, 4: 0.8}
 )
 def test_eigenvalues_lie_within_their_bounds_of_80_digits(alpha, seed, measured):
     """With one bond, near a minimum of two, turned by a little: rods that are parallel to 1e-8 have no one nearest point."""
-    packing, start = quickly_squeezed(8, alpha, PHI[alpha], seed)
+    packing, start = squeezed(12, alpha, PHI[alpha], seed)
     two = Landscape(packing)
     minimum = find(two, start, Target(1e-13)).state
     turns = 1e-7 * np.random.default_rng(seed).normal(size=(packing.n, 1))
