@@ -215,7 +215,7 @@ def test_power_balances(name, measured):
     measured(of_the_box=np.trapezoid(np.abs(box), time) / np.ptp(energy))
     assert np.ptp(energy) > 0.1 * energy[0]
     assert np.trapezoid(np.abs(box), time) > 0.1 * np.ptp(energy)
-    assert np.trapezoid(power, time) == pytest.approx(energy[-1] - energy[0], rel=5e-3)
+    assert np.trapezoid(power, time) == pytest.approx(energy[-1] - energy[0], rel=1e-3)
 
 
 def lost_by_drag(landscape, state, gradient, drag):
