@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import mpmath
 import numpy as np
 import scipy.sparse
-from squeezed import squeezed
+from squeezed import quickly_squeezed
 
 from jamshape.landscape import Landscape
 from jamshape.minima import Residual
@@ -28,7 +28,7 @@ DIGITS = 60
 @cache
 def jammed(name, u0=1e-15):
     """Landscape and minimum."""
-    packing, state = squeezed(*SMALL[name])
+    packing, state = quickly_squeezed(*SMALL[name])
     landscape = Landscape(packing)
     return landscape, find(landscape, state, Target(u0))
 
@@ -46,7 +46,7 @@ def sliding():
     Which packing a start leads to depends on the last digits; some of each few have rods that slide.
     """
     for seed in range(1, 20):
-        packing, state = squeezed(16, 4, 0.8, seed)
+        packing, state = quickly_squeezed(16, 4, 0.8, seed)
         landscape = Landscape(packing)
         minimum = find(landscape, state, Target(1e-15))
         matrix = dynamical_matrix(landscape, minimum.state)
@@ -78,7 +78,7 @@ def second_order(matrix):
     return abs(matrix.prestress).max() ** 2
 
 
-def synthetic(n=48, m=40, size=1e-8, n_sliding=2, seed=0):
+def synthetic(n=36, m=30, size=1e-8, n_sliding=2, seed=0):
     """M = C^T C - S with null modes of C, some of which S moves in second order only."""
     rng = np.random.default_rng(seed)
     C = rng.normal(size=(m, n)) / np.sqrt(n)

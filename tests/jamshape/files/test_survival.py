@@ -28,7 +28,7 @@ from jamshape.files.h5md import (
 
 ROWS = 12  # of the run of these tests; every third one has a frame
 
-KILLS = [pytest.param(30, id="few"), pytest.param(500, id="many", marks=pytest.mark.validate)]
+KILLS = [pytest.param(15, id="few"), pytest.param(500, id="many", marks=pytest.mark.validate)]
 
 
 def frame(step):

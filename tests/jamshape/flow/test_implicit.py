@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from squeezed import squeezed
+from squeezed import quickly_squeezed
 
 from jamshape.flow import implicit as stiff_compression
 from jamshape.flow.implicit import METHODS, Flow, Protocol, Step, compress, drag_coefficients
@@ -93,7 +93,7 @@ def test_two_overlapping_particles_relax_as_in_closed_form(method, alpha, monkey
 
 @pytest.mark.parametrize("method", METHODS)
 def test_huge_steps_land_on_the_quasistatic_minimum(method):
-    packing, state = squeezed(12, 4, 0.95)
+    packing, state = quickly_squeezed(12, 4, 0.95)
     landscape = Landscape(packing)
     state = minimise(landscape, state).state
     start = state.packing(packing)
@@ -109,7 +109,7 @@ def test_huge_steps_land_on_the_quasistatic_minimum(method):
 @pytest.fixture(scope="module")
 def jamming():
     """Twelve rods a little below jamming."""
-    packing, state = squeezed(12, 4, 0.8)
+    packing, state = quickly_squeezed(12, 4, 0.8)
     return state.packing(packing)
 
 
@@ -132,9 +132,9 @@ def test_power_balances(jamming):
     assert energy[-1] > 2 * energy[0]
 
 
-@pytest.mark.parametrize(("alpha", "phi"), [(0, 0.8), (0.01, 0.8), (4, 0.81)])
+@pytest.mark.parametrize(("alpha", "phi"), [(0, 0.8), (0.01, 0.8), (4, 0.83)])
 def test_pressure_is_that_of_radau_through_contacts_that_open_and_close(alpha, phi):
-    packing, state = squeezed(8, alpha, phi)
+    packing, state = quickly_squeezed(8, alpha, phi)
     start, kappa = state.packing(packing), 1e-4
     phi_end = start.phi * 1.02
     exact = pressure(reference(start, kappa, phi_end), phi_end, start)
@@ -151,7 +151,7 @@ def test_pressure_is_that_of_radau_through_contacts_that_open_and_close(alpha, p
 
 
 def test_work_hardly_depends_on_the_rate():
-    packing, state = squeezed(16, 4, 0.95)
+    packing, state = quickly_squeezed(16, 4, 0.95)
     start = minimise(Landscape(packing), state).state.packing(packing)
     phi_end = start.phi * 1.002
     evaluations = []

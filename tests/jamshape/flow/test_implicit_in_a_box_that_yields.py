@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from thinned import in_turn
 
 import jamshape as js
 from jamshape.flow import implicit
@@ -136,24 +137,31 @@ def fixed_steps(monkeypatch):
     return run
 
 
-@pytest.mark.lammps
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("name", SHAPES)
-def test_with_lasting_contacts_it_is_the_motion_of_lammps_to_second_order(
-    name, method, fixed_steps, tmp_path, measured
-):
-    gdot, strain = 1e-4, 4e-4
+@cache
+def sheared_in_lammps(name, gdot, strain):
+    """Start and run in which no contact opens, closes or passes from a side to a tip."""
     held = {"pressure": 1e-2, "t_box": 20.0}
-    for seed in range(1, 9):  # until no contact opens, closes or passes from a side to a tip
-        start = dense(name, seed=seed)
+    n = 8 if name == "rods in space" else 16  # of more than those contacts soon change
+    for seed in range(1, 9):
+        start = dense(name, n, seed)
         exact = js.shear(start=start, gdot=gdot, strain=strain, integrator="rkc2", integration_tolerance=1e-11, rows=4,
-                         file=tmp_path / f"{seed}.h5", progress=False, **held)  # fmt: skip
+                         progress=False, **held)  # fmt: skip
         if bonds_of(start) == bonds_of(exact.packing(-1)):
             break
+    return start, exact
+
+
+@pytest.mark.lammps
+@pytest.mark.parametrize(("name", "method"), in_turn(list(SHAPES), list(METHODS)))
+def test_with_lasting_contacts_it_is_the_motion_of_lammps_to_second_order(
+    name, method, fixed_steps, measured
+):
+    gdot, strain = 1e-4, 4e-4
+    start, exact = sheared_in_lammps(name, gdot, strain)
     assert bonds_of(start) == bonds_of(exact.packing(-1))
     assert abs(exact["p_yy"][-1] / exact["p_yy"][0] - 1) > 1e-3
     errors = []
-    for n in (16, 32, 64):
+    for n in (8, 16, 32):
         course = SlowShear(gdot, strain, tolerance=1e-5, largest_strain=1.0, method=method,
                            hold_pressure=1e-2, t_box=20.0)  # fmt: skip
         flow = fixed_steps(start, course, strain / gdot / n)
@@ -191,7 +199,7 @@ def test_power_balances(name, measured):
     # dU/dt = -V P:G - sum tau.w_host - sum F^2/(k_d V) - sum tau_b^2/(k_d V I_b), G_yy = (P_yy - p) V / (t_box k_e N).
     start, gdot, p, t_box = dense(name, 12), 1e-3, 1e-2, 30.0
     landscape, flow = Landscape(start), Flow(State.of(start))
-    course = SlowShear(gdot, 0.05, tolerance=1e-4, largest_strain=2e-4, hold_pressure=p, t_box=t_box)  # fmt: skip
+    course = SlowShear(gdot, 0.02, tolerance=1e-4, largest_strain=2e-4, hold_pressure=p, t_box=t_box)  # fmt: skip
     rows, drag = [], implicit.drag_coefficients(landscape)
     for step in follow(landscape, flow, course):
         found, tensor, volume = landscape.evaluate(flow.state), landscape.stress(flow.state), flow.state.volume  # fmt: skip
@@ -207,7 +215,7 @@ def test_power_balances(name, measured):
     measured(of_the_box=np.trapezoid(np.abs(box), time) / np.ptp(energy))
     assert np.ptp(energy) > 0.1 * energy[0]
     assert np.trapezoid(np.abs(box), time) > 0.1 * np.ptp(energy)
-    assert np.trapezoid(power, time) == pytest.approx(energy[-1] - energy[0], rel=5e-3)
+    assert np.trapezoid(power, time) == pytest.approx(energy[-1] - energy[0], rel=1e-3)
 
 
 def lost_by_drag(landscape, state, gradient, drag):
@@ -306,9 +314,11 @@ def test_a_large_pressure_is_reached_and_held(name, p):
 
 
 def test_a_pressure_that_contacts_do_not_bear_ends_in_a_sentence():
+    start = dense("discs")  # squeezed, since the box shrinks by no more than a small part in a step
+    start = State.of(start).strained(-0.4).packing(start)
     sentence = r"packing fraction of 4\.?\d*, expected at most 4: contacts do not bear pressure=30"
     with pytest.raises(ValueError, match=sentence):
-        flowed(dense("discs"), SlowShear(1e-3, 5.0, tolerance=1e-1, largest_strain=0.1, hold_pressure=30.0, t_box=1.0))  # fmt: skip
+        flowed(start, SlowShear(1e-3, 5.0, tolerance=1e-1, largest_strain=0.1, hold_pressure=30.0, t_box=1.0))  # fmt: skip
 
 
 def test_a_pressure_that_crosses_particles_ends_in_a_sentence():
@@ -319,7 +329,7 @@ def test_a_pressure_that_crosses_particles_ends_in_a_sentence():
 
 def test_slow_rates_take_implicit_steps_at_a_pressure_by_themselves(tmp_path):
     start = dense("discs")
-    run = js.shear(start=start, gdot=1e-7, strain=1e-3, pressure=1e-2, t_box=1e3, file=tmp_path / "a.h5", progress=False)  # fmt: skip
+    run = js.shear(start=start, gdot=1e-7, strain=1e-3, pressure=1e-2, t_box=1e3, rows=150, file=tmp_path / "a.h5", progress=False)  # fmt: skip
     assert run.about["method"] == "tr-bdf2"
     steady = run.steady(0.0)
     assert steady["p_yy"].value == pytest.approx(run["p_yy"].mean(), rel=0.2)

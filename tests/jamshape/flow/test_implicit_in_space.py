@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
+from thinned import in_turn
 
 import jamshape as js
 from jamshape.flow import implicit
@@ -34,7 +35,7 @@ IN_TURN = [
 ]
 
 
-def dense(name, n=24):
+def dense(name, n=12):
     particles, phi = SHAPES[name]
     start = random_packing(n, 0.1, 1, particles, 3)
     return compressed_to(Landscape(start), State.of(start), phi, 1e-2).packing(start)
@@ -109,8 +110,7 @@ def orders(kind, method):
     return np.log2(np.array(errors[:-1]) / errors[1:])
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("kind", GRADIENTS)
+@pytest.mark.parametrize(("kind", "method"), in_turn(list(GRADIENTS), list(METHODS)))
 def test_a_body_with_different_drags_turns_to_second_order(kind, method, monkeypatch, measured):
     monkeypatch.setattr(implicit, "_EXPLICIT_BELOW", 0.0)
     found = orders(kind, method)
@@ -192,7 +192,7 @@ def test_power_balances():
     # dU/dt = -V P:G - sum tau.w_host - sum F^2/(k_d V) - sum tau_b^2/(k_d V I_b), integrated by trapezoids.
     start, gdot, k_d = dense("ellipsoids", 12), 1e-3, 2.0
     landscape, flow = Landscape(start), Flow(State.of(start))
-    course = SlowShear(gdot, 0.05, tolerance=1e-4, k_d=k_d, largest_strain=2e-4)
+    course = SlowShear(gdot, 0.02, tolerance=1e-4, k_d=k_d, largest_strain=2e-4)
     host, bodies = Host.shearing(gdot, "simple", 3), landscape.bodies
     energy, power, times = [], [], []
     for step in follow(landscape, flow, course):
@@ -227,9 +227,9 @@ def test_huge_steps_land_on_the_quasistatic_minimum():
 
 def test_volume_stays_and_the_box_takes_other_cell_vectors():
     start = dense("spheres", 12)
-    flow, steps, _ = flowed(start, SlowShear(1e-3, 0.8, tolerance=1e-2))
+    flow, steps, _ = flowed(start, SlowShear(1e-3, 0.7, tolerance=1e-2))
     np.testing.assert_allclose([step.phi for step in steps], start.phi, rtol=1e-13)
-    cells = (0.8 * flow.state.cell[1, 1] - flow.state.cell[0, 1]) / flow.state.cell[0, 0]
+    cells = (0.7 * flow.state.cell[1, 1] - flow.state.cell[0, 1]) / flow.state.cell[0, 0]
     assert float(cells) == pytest.approx(round(float(cells)), abs=1e-12)
     assert round(float(cells)) == 1
 

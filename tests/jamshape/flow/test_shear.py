@@ -44,7 +44,7 @@ def test_a_lonely_rod_turns_as_the_closed_form_says(tmp_path):
     """PHYSICS C: the period is 2 pi / (gdot sqrt(1 - c^2)); over whole periods S_2 is (1 - sqrt(1 - c^2)) / c."""
     rod = js.Spherocylinders(alpha=1)
     one = js.shear(
-        rod, n=1, phi=1e-3, gdot=1e-2, strain=0.1, file=tmp_path / "a.h5", progress=False
+        rod, n=1, phi=1e-3, gdot=1e-2, strain=0.1, rows=4, file=tmp_path / "a.h5", progress=False
     )
     body = one.packing(0)
     a, r = (

@@ -1,5 +1,5 @@
 import pytest
-from squeezed import squeezed
+from squeezed import quickly_squeezed
 
 import jamshape as js
 from jamshape.files.h5md import read_report
@@ -10,7 +10,7 @@ from jamshape.protocols.random_start import start_below
 
 
 def test_every_step_is_in_the_file(tmp_path):
-    packing, state = squeezed(8, 4, 0.8)
+    packing, state = quickly_squeezed(8, 4, 0.8)
     start = state.packing(packing)
     rates, end = ((0.0, 1e-4), (0.801, 1e-5)), 0.803
     run = js.slow_compress(

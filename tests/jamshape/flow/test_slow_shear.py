@@ -53,7 +53,7 @@ def test_a_lonely_rod_follows_its_orbit(alpha, flow, measured):
     m = Landscape(start).bodies.moment[0]
     c = (m[1] - m[0]) / m[2]
     theta = float(start.orientation[0])
-    gamma = 0.5
+    gamma = 0.2
     flow_end, _ = flowed(start, gdot=1e-3, strain_end=gamma, flow=flow)
     found = float(flow_end.state.orientation[0, 0])
     if flow == "pure":
@@ -71,11 +71,11 @@ def test_a_lonely_rod_follows_its_orbit(alpha, flow, measured):
 
 
 def test_area_and_shape_of_the_box_are_exact():
-    flow, rows = flowed(dense(), gdot=1e-4, strain_end=1.3, tolerance=1e-2)
+    flow, rows = flowed(dense(n=8), gdot=1e-3, strain_end=0.7, tolerance=1e-2)
     np.testing.assert_allclose([step.phi for step, _ in rows], 0.9, rtol=1e-14)
-    cells = (1.3 * flow.state.cell[1, 1] - flow.state.cell[0, 1]) / flow.state.cell[0, 0]
+    cells = (0.7 * flow.state.cell[1, 1] - flow.state.cell[0, 1]) / flow.state.cell[0, 0]
     assert abs(flow.state.cell[0, 1]) <= 0.61 * flow.state.cell[0, 0]
-    assert float(cells) == pytest.approx(round(float(cells)), abs=1e-12)
+    assert float(cells) == pytest.approx(1, abs=1e-12)
 
 
 @pytest.mark.lammps
@@ -164,12 +164,13 @@ def test_frames_show_a_box_that_takes_other_cell_vectors(tmp_path, monkeypatch):
 
 def test_slow_rates_take_implicit_steps_by_themselves(tmp_path):
     start = dense()
-    run = js.shear(start=start, gdot=1e-7, strain=1e-3, file=tmp_path / "a.h5", progress=False)
+    asked = {"start": start, "gdot": 1e-7, "strain": 1e-3, "rows": 100, "progress": False}
+    run = js.shear(file=tmp_path / "a.h5", **asked)
     assert run.about["method"] == "tr-bdf2"
     assert run.steady(0.0)["mu"].value > 0
-    again = js.shear(start=start, gdot=1e-7, strain=1e-3, file=tmp_path / "a.h5", progress=False)
+    again = js.shear(file=tmp_path / "a.h5", **asked)
     assert len(again) == len(run)
-    one = js.shear(start=start, gdot=1e-7, strain=1e-3, integrator="tr-bdf2", sides=1, file=tmp_path / "b.h5", progress=False)  # fmt: skip
+    one = js.shear(integrator="tr-bdf2", sides=1, file=tmp_path / "b.h5", **asked)
     assert one.about["sides"] == 1
     assert list(one)[-1].law.sides == 1
     with pytest.raises(ValueError, match="sides=1, expected 2"):

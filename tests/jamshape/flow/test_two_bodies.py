@@ -41,9 +41,11 @@ def reference(packing):
     c = (moment[:, 1] - moment[:, 0]) / moment[:, 2]
     scale = np.where(landscape.rotation_length > 0, landscape.rotation_length, 1.0)
 
+    cell = State.of(packing).cell
+
     def rates(_, values):
         position, angle = values[:4].reshape(2, 2), values[4:]
-        state = State.of(packing.with_(position=position, orientation=angle))
+        state = State(np.longdouble(position), np.longdouble(angle[:, None]), cell)
         slope = landscape.components(landscape.evaluate(state).gradient)
         velocity = -slope[:, :2] / area[:, None]
         velocity[:, 0] += GDOT * position[:, 1]
@@ -54,7 +56,7 @@ def reference(packing):
     begun = np.concatenate([packing.position.ravel(), packing.orientation])
     # Contacts open and close: no step leads over that.
     done = solve_ivp(
-        rates, (0, STRAIN / GDOT), begun, "DOP853", rtol=1e-10, atol=1e-10, max_step=1.0
+        rates, (0, STRAIN / GDOT), begun, "DOP853", rtol=1e-10, atol=1e-10, max_step=2.0
     )
     assert done.success
     end = done.y[:, -1]

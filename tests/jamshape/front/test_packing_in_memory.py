@@ -22,7 +22,7 @@ STEPS = {
     "Monte Carlo": {"protocol": "yuan-2019-2", "n_sweeps": 20, "u0": 0},
 }
 IN_LAMMPS = {
-    "dynamics": {"protocol": "dynamics", "kappa": 1e-4},
+    "dynamics": {"protocol": "dynamics", "kappa": 1e-5, "phi_start": 0.5},
     "marschall-2018": {"protocol": "marschall-2018", "kappa": 1e-4},
 }
 RUNS = {

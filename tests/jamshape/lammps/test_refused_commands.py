@@ -103,12 +103,13 @@ def test_a_compression_that_is_refused_leaves_a_whole_file(tmp_path, monkeypatch
     monkeypatch.setattr(recorder, "SECONDS", 0.0)
     monkeypatch.setattr(lammps_driver, "EVALUATIONS_PER_MARK", 2)
     rods = js.Spherocylinders(alpha=4)
-    settings = {"n": 16, "kappa": 1e-2, "phi": (0.4, 1.4), "progress": False}
+    settings = {"n": 16, "kappa": 1e-2, "phi": (0.4, 1.4), "rows": 50, "progress": False}
     with pytest.raises(LammpsError, match=r"found timestep 3 above the stability limit"):
         js.compress(rods, dt=3.0, file=tmp_path / "refused.h5", **settings)
     assert not read_attributes(tmp_path / "refused.h5")["finished"]
     assert np.isfinite(read_observables(tmp_path / "refused.h5")["pressure"]).all()
     assert 0.4 < read_packing(tmp_path / "refused.h5").phi < 1.4
+    monkeypatch.undo()
     done = js.compress(rods, dt=0.5, file=tmp_path / "again.h5", **settings)
     assert done.phi[-1] == pytest.approx(1.4, rel=0.01)
     assert read_attributes(tmp_path / "again.h5")["finished"]

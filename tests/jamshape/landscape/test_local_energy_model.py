@@ -3,7 +3,7 @@ import pytest
 from mixtures import superellipsoids
 from pressed import PRESSED, pressed_named
 from scenes import pressed
-from squeezed import squeezed
+from squeezed import quickly_squeezed
 from superellipsoid_packings import pressed_superellipsoids
 
 import jamshape as js
@@ -65,7 +65,7 @@ def test_where_nothing_has_turned_torques_are_those_of_the_landscape(packing):
 
 
 def test_particles_that_touch_their_own_images_have_the_factors_of_the_hessian():
-    packing, state = squeezed(2, 4.0, 1.0)
+    packing, state = quickly_squeezed(2, 4.0, 1.0)
     i, j = find_contacts(state.packing(packing), sides=2).pairs.T
     assert (i == j).any()
     require_factors_of_the_hessian(state.packing(packing))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pressed import PRESSED, pressed_named
 from scenes import pressed
-from squeezed import squeezed
+from squeezed import quickly_squeezed
 
 import jamshape as js
 from jamshape import _contact
@@ -95,7 +95,7 @@ def test_particles_without_contacts_are_shifted_by_the_least(dimension):
 
 
 def test_hessians_of_minima_keep_their_shift():
-    packing, state = squeezed(24, 0, 0.9)
+    packing, state = quickly_squeezed(24, 0, 0.9)
     landscape = Landscape(packing)
     values = np.linalg.eigvalsh(landscape.curvature(state).hessian.toarray())
     shift = 1e-6

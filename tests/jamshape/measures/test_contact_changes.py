@@ -14,7 +14,7 @@ from jamshape.checks import NotReachedWarning
 from jamshape.landscape import State
 from jamshape.measures.contact_changes import At, Search, contact_changes
 
-VALUES = (1e-5, 1e-6, 1e-7, 1e-5)
+VALUES = (1e-5, 1e-6, 1e-7, 1e-4)
 
 
 @pytest.fixture(scope="module")
@@ -108,13 +108,14 @@ def test_changes_are_enclosed_as_closely_as_requested(run):
 
 def test_changes_of_a_quasistatic_shear_have_its_strain(start, tmp_path):
     file = tmp_path / "aqs.h5"
-    run = js.quasistatic_shear(start=start, step=1e-3, strain=0.02, file=file, progress=False)
+    run = js.quasistatic_shear(start=start, step=1e-2, strain=0.05, file=file, progress=False)
     changes = run.contact_changes()
-    assert len(run) == 22
+    assert len(run) == 7
+    assert changes
     for one in changes:
-        assert one.after - one.before == pytest.approx(1e-3, rel=1e-9)
+        assert one.after - one.before == pytest.approx(1e-2, rel=1e-9)
     for one in run.contact_changes(within=1e-3):
-        assert 0 < one.after - one.before <= 1e-3 * 0.02
+        assert 0 < one.after - one.before <= 1e-3 * 0.05
     bonds = [int(run.packing(k).contacts().network.n_bonds.sum()) for k in (1, -1)]
     assert sum(1 if one.change == "closed" else -1 for one in changes) == bonds[1] - bonds[0]
 

@@ -47,7 +47,7 @@ def test_foot_of_a_finite_rate_is_left_out(width, rows):
 def test_error_is_that_of_noise():
     rng = np.random.default_rng(1)
     phi = np.linspace(0.7, 0.9, 300)
-    p = line(phi) + 3e-5 * rng.standard_normal((60, len(phi)))
+    p = line(phi) + 3e-5 * rng.standard_normal((30, len(phi)))
     phi_J, error = np.array([fit_onset(phi, row)[:2] for row in p]).T
     assert phi_J.mean() == pytest.approx(PHI_J, abs=2e-5)
     assert 0.3 < np.sqrt(np.mean(((phi_J - PHI_J) / error) ** 2)) < 1.2

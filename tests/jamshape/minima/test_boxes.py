@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from thinned import in_turn
 
 import jamshape as js
 from jamshape.checks import ArgumentError
@@ -56,8 +57,7 @@ def test_only_the_first_strain_changes_the_volume(box, dimension):
         assert len(flat) == len(COMPONENTS[dimension])
 
 
-@pytest.mark.parametrize("pressure", [1e-2, 1e-5, 1e-8])
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(("name", "pressure"), in_turn(list(SCENES), [1e-2, 1e-5, 1e-8]))
 def test_the_stress_is_the_pressure_and_nothing_else(name, pressure):
     landscape, found = at_pressure(name, pressure)
     again = js.energy(found.state.packing(landscape.particles)).pressure_tensor

@@ -5,7 +5,7 @@ import pytest
 from mixtures import bidisperse
 from pressed import PRESSED, pressed_named
 from scenes import make, pressed
-from squeezed import squeezed
+from squeezed import quickly_squeezed
 from superellipsoid_packings import ellipsoids, octahedra_and_boxes, superellipses
 
 from jamshape.landscape import CrossingError, Landscape, State
@@ -24,7 +24,7 @@ from methods.lbfgs import lbfgs
 
 def shaken(n, alpha, phi, seed=1):
     """A squeezed packing, away from its minimum but in its neighbourhood."""
-    packing, state = squeezed(n, alpha, phi, seed)
+    packing, state = quickly_squeezed(n, alpha, phi, seed)
     landscape = Landscape(packing)
     step = np.random.default_rng(0).normal(size=landscape.size)
     return landscape, landscape.displaced(state, 0.02 * step)

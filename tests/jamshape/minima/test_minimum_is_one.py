@@ -15,7 +15,7 @@ from minima import (
     typical_overlap,
     unconstrained,
 )
-from squeezed import squeezed
+from squeezed import quickly_squeezed
 
 from jamshape.landscape import Landscape, State
 from jamshape.minima import History, Minimum, Outcome, residual_of
@@ -35,7 +35,7 @@ FOUND = {
 @cache
 def found(name):
     n, alpha, phi, seed, u0 = FOUND[name]
-    packing, state = squeezed(n, alpha, phi, seed)
+    packing, state = quickly_squeezed(n, alpha, phi, seed)
     landscape = Landscape(packing)
     return landscape, find(landscape, state, Target(u0))
 

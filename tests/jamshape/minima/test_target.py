@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from squeezed import squeezed
+from squeezed import quickly_squeezed
 
 from jamshape.contacts import coordination, find_contacts
 from jamshape.landscape import Landscape
@@ -27,7 +27,7 @@ ENERGIES = (1e-4, 1e-9, 1e-15, 1e-18)
 
 
 def start_of(name):
-    packing, state = squeezed(*STARTS[name])
+    packing, state = quickly_squeezed(*STARTS[name])
     return Landscape(packing), state
 
 
@@ -247,7 +247,7 @@ def test_energies_out_of_reach_are_refused_before_anything_is_done(u0):
 
 
 def test_a_start_far_above_jamming_is_opened_until_it_unjams():
-    packing, state = squeezed(24, 0.01, 0.80)
+    packing, state = quickly_squeezed(24, 0.01, 0.80)
     landscape = Landscape(packing)
     above = find(landscape, state, Target(1e-12)).state.strained(-6e-3)
     minimum = find(landscape, above, Target(1e-15))

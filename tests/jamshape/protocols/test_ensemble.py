@@ -81,15 +81,15 @@ def test_a_script_needs_no_guard_and_a_kill_loses_nothing(table, tmp_path):
 def test_it_stops_in_time_and_goes_on(table, tmp_path):
     file = tmp_path / "set.h5"
     with pytest.raises(TimeLimitError, match=r"stopped after 0 s at \d of 8, expected the end"):
-        js.ensemble(DISCS, **HOW, file=file, seconds=0.0)
+        js.ensemble(DISCS, **HOW, jobs=1, file=file, seconds=0.0)
     assert not js.load(file).about["finished"]
     copy, folder = tmp_path / "copy.h5", tmp_path / "packings"
     copy.write_bytes(file.read_bytes())
     assert contents_of(copy)["go_on"] == f"js.resume({str(copy)!r}) in Python"
     assert same(table, js.resume(copy, progress=False))
-    assert same(table, js.ensemble(DISCS, **HOW, file=file))
+    assert same(table, js.ensemble(DISCS, **HOW, jobs=1, file=file))
     with pytest.raises(TimeLimitError):
-        js.ensemble(DISCS, **HOW, file=file, again=True, folder=folder, seconds=0.0)
+        js.ensemble(DISCS, **HOW, jobs=1, file=file, again=True, folder=folder, seconds=0.0)
     assert same(table, js.resume(file, progress=False))
     assert len(list(folder.glob("alpha0_seed*.h5"))) == 8
 

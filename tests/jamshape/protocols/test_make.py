@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from making import made, stage_of, write_every_mark
 from mixtures import bidisperse, monodisperse
-from squeezed import squeezed
+from squeezed import quickly_squeezed
 from written import FINISHED, write_columns
 
 import jamshape as js
@@ -32,7 +32,7 @@ from jamshape.shapes.shape import Interaction
 
 U0 = 1e-12
 RECIPE = Recipe(bidisperse(1.0), n=16, phi_start=0.5, target=Target(U0))
-FAST = Dynamics(Approach(kappa=1e-5, p_end=3e-3))
+FAST = Dynamics(Approach(kappa=1e-5, p_end=3e-3, strain=2e-4))
 
 
 def run_of(out):
@@ -46,7 +46,7 @@ def making_of(out):
 @cache
 def start():
     """A packing of rods just below jamming, in doubles."""
-    packing, state = squeezed(16, 1, 0.86)
+    packing, state = quickly_squeezed(16, 1, 0.86)
     return state.packing(packing).with_(position=state.packing(packing).position, step=3)
 
 
@@ -167,9 +167,8 @@ def test_a_search_that_was_killed_goes_on_to_the_same_bits(whole, tmp_path, monk
 
 
 def test_a_search_from_a_start_without_contacts_goes_on_to_the_same_bits(tmp_path, monkeypatch):
-    write_every_mark(monkeypatch)
     # Its first state is all doubles, those after it are not.
-    packing, state = squeezed(16, 1, 0.86)
+    packing, state = quickly_squeezed(16, 1, 0.86)
     apart = state.strained(0.006).packing(packing)
     apart = apart.with_(position=apart.position, orientation=apart.orientation, box=apart.box)
     assert not len(find_contacts(apart, 1.0, 2).pairs)
@@ -177,7 +176,9 @@ def test_a_search_from_a_start_without_contacts_goes_on_to_the_same_bits(tmp_pat
     for path in (unbroken, out):
         compressed(path, apart)
     make(RECIPE, unbroken)
-    made(RECIPE, out, 1)
+    with monkeypatch.context() as patch:
+        write_every_mark(patch)
+        made(RECIPE, out, 1)
     make(RECIPE, out)
     assert_same_result(out, unbroken)
 
@@ -339,6 +340,7 @@ def test_a_compression_that_was_killed_goes_on_to_a_result(tmp_path, monkeypatch
     out = tmp_path / "packing.h5"
     made(sample, out, approach.ROWS_PER_MARK + 10)
     assert not read_attributes(run_of(out))["finished"]
+    monkeypatch.undo()  # the rest need not be written at every mark
     progress = made(sample, out)
     assert {stage_of(at) for at in progress} == {"compression", "search"}
     rest = rows[approach.ROWS_PER_MARK :]
@@ -368,12 +370,24 @@ def test_what_a_kill_after_the_last_write_leaves_goes_with_the_next_call(tmp_pat
     np.testing.assert_array_equal(made.position, again.position)
 
 
+FROM_LOOSE = Recipe(bidisperse(0.0), n=16, phi_start=0.6, target=Target(1e-6), way=FAST)
+
+
+@pytest.fixture(scope="module")
+def rates(tmp_path_factory):
+    """Rates of the rows of a compression."""
+    out = tmp_path_factory.mktemp("usual") / "usual.h5"
+    make(FROM_LOOSE, out)
+    return read_observables(run_of(out))["kappa"]
+
+
+@pytest.mark.lammps
 @pytest.mark.parametrize("which", ["first change of the rate", "last row before the opening"])
-def test_a_kill_where_the_rate_changes_is_gone_on_from_to_the_bit(tmp_path, monkeypatch, which):
-    sample = Recipe(bidisperse(0.0), n=16, phi_start=0.6, target=Target(1e-6), way=FAST)
-    usual, whole, cut = (tmp_path / f"{name}.h5" for name in ("usual", "whole", "cut"))
-    make(sample, usual)
-    kappa = read_observables(run_of(usual))["kappa"]
+def test_a_kill_where_the_rate_changes_is_gone_on_from_to_the_bit(
+    rates, tmp_path, monkeypatch, which
+):
+    sample, kappa = FROM_LOOSE, rates
+    whole, cut = (tmp_path / f"{name}.h5" for name in ("whole", "cut"))
     changes = np.flatnonzero(np.diff(kappa))
     row = changes[0] if which.startswith("first") else np.flatnonzero(kappa > 0)[-1]
     # A restart file at this very row, which orders particles anew.

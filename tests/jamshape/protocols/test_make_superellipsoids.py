@@ -99,13 +99,14 @@ def test_protocol_1_ends_just_above_the_jamming_that_the_direct_search_finds(tmp
 
 
 def test_protocol_2_thermalises_and_goes_on_from_where_it_was(tmp_path, monkeypatch):
-    write_every_mark(monkeypatch)
     way = Steps(COARSE.quasistatic, Thermalisation(0.4, 200))
-    sample = Recipe(superellipsoids(1.5), 40, 3, phi_start=0.3, way=way, target=Target(1e-10))
+    sample = Recipe(superellipsoids(1.5), 16, 3, phi_start=0.3, way=way, target=Target(1e-10))
     stages = stages_of(sample, tmp_path / "whole.h5")
     first, last = stages.index("Monte Carlo"), len(stages) - stages[::-1].index("Monte Carlo")
     assert set(stages[:first]) == set(stages[last:]) - {"search"} == {"compression"}
+    write_every_mark(monkeypatch)
     *_, at = made(sample, tmp_path / "cut.h5", first + 8)
+    monkeypatch.undo()
     assert at.part == 80 / 200
     assert "sweep 80 of 200, acceptance 0." in at.text
     assert len(stages_of(sample, tmp_path / "cut.h5")) == len(stages) - first - 8

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from making import made, stage_of, write_every_mark
-from squeezed import squeezed
+from squeezed import quickly_squeezed
 
 import jamshape as js
 from jamshape.files.h5md import (
@@ -40,7 +40,7 @@ STRAINS = (
 @cache
 def frames():
     """A rod packing that is squeezed from well below jamming to well above."""
-    packing, state = squeezed(16, 1, 0.86)
+    packing, state = quickly_squeezed(16, 1, 0.86)
     loose = state.strained(0.02).packing(packing)
     start = State.of(loose.with_(position=loose.position, orientation=loose.orientation))
     states = [start.strained(-strain) for strain in STRAINS]
@@ -178,14 +178,15 @@ def test_both_searches_end_at_one_packing(run, tmp_path):
 
 
 def test_a_halving_search_that_was_killed_goes_on_to_the_same_bits(run, tmp_path, monkeypatch):
-    write_every_mark(monkeypatch)
     recipe = recipe_for(protocol="marschall-2018", start=run, search="bisection", u0=U0)
     whole, cut = tmp_path / "whole.h5", tmp_path / "cut.h5"
     steps = made(recipe, whole)
+    write_every_mark(monkeypatch)
     searched = [at for at in steps if stage_of(at) == "search"]
     # Before u crosses u0, and while lambda is halved.
     made(recipe, cut, len(steps) - len(searched) + 20)
     made(recipe, cut, len(searched) - 40)
+    monkeypatch.undo()
     rest = made(recipe, cut)
     assert len(rest) == 20
     assert rest[-1].text == searched[-1].text

@@ -86,7 +86,7 @@ def test_steps_end_at_walls():
 @pytest.fixture(scope="module")
 def strict(tmp_path_factory):
     out = tmp_path_factory.mktemp("strict") / "packing.h5"
-    recipe = recipe_for(bidisperse(4.0), n=32, seed=1, strict=True)
+    recipe = recipe_for(bidisperse(4.0), n=12, seed=1, strict=True)
     make(recipe, out)
     return out, recipe
 
@@ -177,12 +177,13 @@ def test_a_kink_takes_the_eigenvalue_of_what_crosses_it_and_no_other():
 
 def test_strict_search_goes_on_from_its_file(strict, tmp_path, monkeypatch):
     out, recipe = strict
-    write_every_mark(monkeypatch)
     again, whole = tmp_path / "packing.h5", tmp_path / "whole.h5"
     first = stages_of(recipe, whole).index("strict")
+    write_every_mark(monkeypatch)
     assert set(stages_of(recipe, again, first + 4)[first:]) == {"strict"}
     file = tmp_path / "packing.h5.making.h5"
     assert read_attributes(file)["stage"] == "strengthening"
+    monkeypatch.undo()
     make(recipe, again)
     stored, expected = read_attributes(again), read_attributes(out)
     for name in ("strict_steps", "n_negative", "outcome", "phi_J", "u", "evaluations"):

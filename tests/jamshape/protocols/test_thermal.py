@@ -6,7 +6,7 @@ from superellipsoid_packings import scattered
 from jamshape.contacts import find_contacts
 from jamshape.landscape import Landscape, State
 from jamshape.minima import Stop, minimise
-from jamshape.packing import Box
+from jamshape.packing import Box, body_axes
 from jamshape.protocols.random_start import random_packing
 from jamshape.protocols.thermal import Thermal, equilibrate, without_overlaps
 from methods.lbfgs import lbfgs
@@ -63,16 +63,12 @@ def test_two_spheres_have_the_distribution_of_free_places():
     # All places outside the other sphere are equally likely: the mean of any function is an integral.
     edge, n = 4.2, 4000
     packing = scattered(np.ones((2, 3)), np.ones(2), 0.01)
-    packing = packing.with_(
-        position=np.array([[0.0, 0, 0], [2.0, 2, 2]]), box=Box(np.zeros(3), np.full(3, edge))
-    )
-    distance = []
+    packing = packing.with_(box=Box(np.zeros(3), np.full(3, edge)))
+    compiled, position, distance = packing.compiled(), np.array([[0.0, 0, 0], [2.0, 2, 2]]), []
     for k in range(n):
-        found = packing.compiled().sweeps(
-            packing.position, packing.orientation, packing.box.edges, 2.0, 0.5, 3, k
-        )
-        packing = packing.with_(position=found["position"])
-        r = packing.position[0] - packing.position[1]
+        found = compiled.sweeps(position, packing.orientation, packing.box.edges, 2.0, 0.5, 3, k)
+        position = found["position"]
+        r = position[0] - position[1]
         distance.append(np.linalg.norm(r - edge * np.round(r / edge)))
     assert min(distance) >= 1.0
     grid = (np.arange(64) + 0.5) / 64 * edge - edge / 2
@@ -85,14 +81,12 @@ def test_two_spheres_have_the_distribution_of_free_places():
 
 def test_orientations_of_a_lone_particle_become_uniform():
     packing = scattered(np.array([[1.0, 1, 3], [1, 1, 3]]), np.ones(2), 0.01)
-    packing = packing.with_(position=np.array([[0.0, 0, 0], [1, 1, 1]]) * packing.box.edges / 2)
-    axis = []
+    compiled, orientation, axis = packing.compiled(), packing.orientation, []
+    position = np.array([[0.0, 0, 0], [1, 1, 1]]) * packing.box.edges / 2
     for k in range(3000):
-        found = packing.compiled().sweeps(
-            packing.position, packing.orientation, packing.box.edges, 0.1, 1.0, 3, k
-        )
-        packing = packing.with_(position=found["position"], orientation=found["orientation"])
-        axis.append(packing.body_axes(2)[0])
+        found = compiled.sweeps(position, orientation, packing.box.edges, 0.1, 1.0, 3, k)
+        position, orientation = found["position"], found["orientation"]
+        axis.append(body_axes(orientation)[0, 2])
     mean = np.mean([np.outer(a, a) for a in axis], axis=0)
     np.testing.assert_allclose(mean, np.eye(3) / 3, atol=0.03)
 

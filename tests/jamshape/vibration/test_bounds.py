@@ -169,7 +169,7 @@ FORMED = {
 
 
 FORMS = [(name, 12, seed) for name in FORMED for seed in (3, 4, 5)]
-FEW = [("asymmetric dimers", 12, 3), ("trimers", 12, 3), ("rectangles", 6, 3)]
+FEW = [("asymmetric dimers", 8, 3), ("trimers", 8, 3), ("rectangles", 6, 3)]
 
 
 @pytest.mark.parametrize(

@@ -192,8 +192,11 @@ def test_rounding_of_tensors_is_bounded(name):
             for part in (given.stretched, given.pushed, matrix.translations)
         )
         push = C.T * s + f
-        beside = C.T * C - S + Z * Z.T
-        columns = [mpmath.lu_solve(beside, -push[:, k]) for k in range(3)]
+        factors, order = mpmath.mp.LU_decomp(C.T * C - S + Z * Z.T)
+        columns = [
+            mpmath.mp.U_solve(factors, mpmath.mp.L_solve(factors, -push[:, k], order))
+            for k in range(3)
+        ]
         rise = s.T * s + mpmath.matrix([[(push[:, k].T * x)[0] for x in columns] for k in range(3)])
         virial = matrix.contacts["separation"].T @ matrix.contacts["force"]
         virial = 0.5 * (virial + virial.T)  # what is left of torques is not part of a pressure

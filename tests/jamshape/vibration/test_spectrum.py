@@ -285,12 +285,13 @@ def test_sparse_bounds_hold(exact):
 
 
 def test_shifted_inverse_keeps_the_prestress():
-    matrix, b = synthetic(), np.random.default_rng(3).normal(size=48)
+    matrix = synthetic()
+    b = np.random.default_rng(3).normal(size=matrix.size)
     v = ShiftedInverse(matrix, -1e-17).solve(b).v
     with mpmath.workdps(DIGITS):
         C = mpmath.matrix(matrix.compatibility.toarray().tolist())
         M = C.T * C - mpmath.matrix(matrix.prestress.toarray().tolist())
-        for i in range(48):
+        for i in range(matrix.size):
             M[i, i] += mpmath.mpf(1e-17)
         expected = np.array([float(x) for x in mpmath.lu_solve(M, mpmath.matrix(b.tolist()))])
     np.testing.assert_allclose(v, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
