@@ -215,7 +215,7 @@ def jammed(tmp_path_factory):
 @pytest.mark.parametrize("source", ["restart", "data"])
 def test_minimising_balances_forces(source, jammed, tmp_path):
     start = {source: jammed / f"out.{source}", "p": SMALL[BODIES]["p"]}
-    run_deck("minimize_superellipsoid", tmp_path, maxiter=3000, out="out", **start)
+    run_deck("minimize_superellipsoid", tmp_path, maxiter=1000, out="out", **start)
     rows = thermo(tmp_path / "out.log")
     np.testing.assert_allclose(rows["phi"], thermo(jammed / "out.log")["phi"][-1], rtol=1e-7)
     assert rows["u"][-1] < rows["u"][0]
