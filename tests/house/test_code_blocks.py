@@ -79,7 +79,8 @@ QUICK = [
     Told("*", "--protocol yuan-2019-1", "--n 16 --delta-phi 0.02 --tolerance 1e-1 --phi-start 0.3"),
     Told("*", "--protocol yuan-2019-2", "--n 16 --delta-phi 0.02 --tolerance 1e-1 --phi-start 0.3 --n-sweeps 20"),
     Told("*/protocols.md", "jamshape slow", "--n 16 --alpha 1 --phi-start 0.8 --kappa 1e-5 --phi-end 0.95"),
-    Told("*/energies-and-modes.md", "jamshape pack", "--n 32"),
+    Told("*/energies-and-modes.md", "jamshape pack", "--n 16"),
+    Told("*/movies.md", "jamshape draw", "--dpi 50 --every 4"),
     Told("*/stress.md", "jamshape pack", "--threads 1"),
     Told("*", "jamshape sweep", f"--samples 1 {SMALL}"),
     Told("*", "jamshape pack --alpha 4", f"--alpha 1 {SMALL}"),
@@ -98,6 +99,8 @@ QUICK = [
 """Changes that make a command quick: the first on such a page that has all these words."""
 
 SHORTER = {
+    "README.md": {"n": 16},
+    "docs/how-to/energies-and-modes.md": {"n": 16},
     "docs/how-to/shear.md": {"n": 16, "strain": 1, "cycles": 2},
     "docs/how-to/movies.md": {"n": 16, "step": 4},  # of 1e-2: half as many frames
 }
