@@ -232,9 +232,7 @@ def test_a_sample_that_another_process_makes_is_told(tmp_path, monkeypatch):
         (("--no-such", "1"), "unrecognized arguments: --no-such 1"),
     ],
 )
-def test_what_means_nothing_is_refused_before_anything_is_made(
-    tmp_path, options, words, run_here
-):
+def test_what_means_nothing_is_refused_before_anything_is_made(tmp_path, options, words, run_here):
     done = run_here(DRIVER, "--alpha", "1", *options, "--out", tmp_path / "none")
     assert (done.returncode, done.stdout) == (2, "")
     assert words in done.stderr.splitlines()[-1]
