@@ -271,9 +271,25 @@ def block_of(page):
 WITH_CODE = dict.fromkeys(block.page for block in ALL_BLOCKS if not is_directive(block))
 LONG = {
     f"docs/how-to/{name}.md"
-    for name in ("shear", "twelve-tasks", "command", "many-packings", "stress")
+    for name in (
+        *("shear", "twelve-tasks", "command", "many-packings", "stress"),
+        *("protocols", "energies-and-modes"),
+    )
 }
-"""Pages that take more than ten seconds."""
+"""Pages that take more than five seconds; in the default suite only their words are checked."""
+
+
+class Proofreader(Reader):
+    """Someone who looks at the words of each program on a page, and runs none."""
+
+    def call(self, place, program, words):
+        if program == BLOCK:
+            block = self.blocks[int(words[0])]
+            if block.language == "python":
+                compile(block.text, self.page, "exec")
+        else:
+            check(place, program, words)
+        return 0
 
 
 @pytest.mark.lammps
@@ -287,6 +303,14 @@ def test_the_code_of_a_page_runs(page, tmp_path, monkeypatch):
     reader.read()
     if page in AFTER:
         AFTER[page](folder, reader.said.getvalue())
+
+
+@pytest.mark.parametrize("page", sorted(LONG))
+def test_the_code_of_a_long_page_has_words_that_programs_know(page, tmp_path, monkeypatch):
+    folder = tmp_path / "clone"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    Proofreader(page, folder).read()
 
 
 # The CHANGELOG tells what was, and not what is.
