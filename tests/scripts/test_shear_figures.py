@@ -22,7 +22,7 @@ def runs(tmp_path_factory):
             (3e-3, {"integrator": "tr-bdf2", "integration_tolerance": 1e-1}),
         ):
             path = folder / f"phi{phi}_g{gdot}.h5"
-            js.shear(js.Spherocylinders(alpha=2), n=12, phi=phi, gdot=gdot, strain=0.5, rows=60,
+            js.shear(js.Spherocylinders(alpha=2), n=12, phi=phi, gdot=gdot, strain=0.3, rows=60,
                      file=path, progress=False, **how)  # fmt: skip
             paths.append(path)
     return paths
