@@ -14,14 +14,9 @@ DRIVER = Path(__file__).parents[2] / "pyscripts" / "compress.py"
 SMALL = ("--n", "48", "--kappa", "3e-4", "--dt", "0.1", "--phi-end", "0.86", "--rows", "60")
 
 
-def command(out, *options, settings=SMALL):
-    return [sys.executable, str(DRIVER), *settings, "--out", str(out), *options]
-
-
-def run(out, *options, **settings):
-    return subprocess.run(
-        command(out, *options, **settings), capture_output=True, text=True, check=False
-    )
+def run(out, *options):
+    command = [sys.executable, str(DRIVER), *SMALL, "--out", str(out), *options]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
 @pytest.fixture(scope="module")
@@ -45,11 +40,12 @@ def test_a_run_reaches_its_end_and_reports_it(whole):
     assert read_attributes(out)["finished"]
 
 
-def test_integrators_that_choose_their_steps_take_rows_as_steps(tmp_path):
+def test_integrators_that_choose_their_steps_take_rows_as_steps(tmp_path, run_here):
     out, tolerance = tmp_path / "rkc2.h5", 1e-3
     options = ("--sides", "2", "--integrator", "rkc2", "--integration-tolerance", str(tolerance))
-    chosen = {"settings": [word for word in SMALL if word not in {"--dt", "0.1"}]}
-    finished = run(out, *options, **chosen)
+    settings = [word for word in SMALL if word not in {"--dt", "0.1"}]
+    call = (DRIVER, *settings, "--out", out, *options)
+    finished = run_here(*call)
     assert finished.returncode == 0, finished.stderr
     observables, history = read_observables(out), read_report(out)
     assert len(observables["pressure"]) == 61
@@ -60,25 +56,24 @@ def test_integrators_that_choose_their_steps_take_rows_as_steps(tmp_path):
     assert (observables["substep_shortest"] > 0).sum() >= 60
     assert observables["forced"][-1] == 0
     assert observables["evaluations"][-1] < 2 * read_attributes(out)["dt"] * 60 / 0.05
-    again = run(out, *options, **chosen)
-    assert again.returncode == 0
+    assert run_here(*call).returncode == 0
 
 
-def test_resume_is_accepted_for_one_release(whole):
+def test_resume_is_accepted_for_one_release(whole, run_here):
     """With the settings, or with none, which takes those of the file."""
     out, report = whole
     for settings in (SMALL, ()):
-        again = run(out, "--resume", settings=settings)
+        again = run_here(DRIVER, *settings, "--out", out, "--resume")
         assert json.loads(again.stdout.splitlines()[-1]) == report
         assert again.stderr.startswith(
             "compress.py: warning: the same command resumes without --resume, which goes with the next release\n"
         )
 
 
-def test_a_finished_run_is_left_alone(whole):
+def test_a_finished_run_is_left_alone(whole, run_here):
     out, report = whole
     before = out.read_bytes()
-    again = run(out)
+    again = run_here(DRIVER, *SMALL, "--out", out)
     assert again.returncode == 0
     assert json.loads(again.stdout.splitlines()[-1]) == report
     assert out.read_bytes() == before

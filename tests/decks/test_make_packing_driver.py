@@ -17,7 +17,7 @@ pytestmark = pytest.mark.lammps
 
 DRIVER = Path(__file__).parents[2] / "pyscripts" / "make_packing.py"
 USUAL = ("--n", "16", "--alpha", "1", "--phi-start", "0.6", "--u0", "1e-9")
-SMALL = (*USUAL, "--protocol", "dynamics", "--kappa", "1e-5", "--p-end", "3e-3")
+SMALL = (*USUAL, "--protocol", "dynamics", "--kappa", "1e-5", "--p-end", "1e-3")
 
 
 def run(*options):
@@ -33,8 +33,8 @@ def made(tmp_path_factory):
     return out, finished
 
 
-def test_help_names_every_option():
-    found = run("--help")
+def test_help_names_every_option(run_here):
+    found = run_here(DRIVER, "--help")
     assert found.returncode == 0
     for name in ("--alpha", "--n ", "--size-ratio", "--seed", "--u0", "--out", "--again"):
         assert name in found.stdout
@@ -81,9 +81,9 @@ def test_the_compression_is_beside_it_and_nothing_else(made):
     assert np.all(np.diff(observables["phi"][~closing]) < 0)
 
 
-def test_the_usual_way_leaves_the_packing_and_nothing_else(tmp_path):
+def test_the_usual_way_leaves_the_packing_and_nothing_else(tmp_path, run_here):
     out = tmp_path / "packing.h5"
-    finished = run(*USUAL, "--out", out)
+    finished = run_here(DRIVER, *USUAL, "--out", out)
     assert finished.returncode == 0, finished.stderr
     assert [path.name for path in tmp_path.iterdir()] == [out.name]
     report, stored = json.loads(finished.stdout), read_attributes(out)
@@ -92,15 +92,15 @@ def test_the_usual_way_leaves_the_packing_and_nothing_else(tmp_path):
     assert stored["protocol"] == "quasistatic"
     assert not {"kappa", "way"} & stored.keys()
     for path in (out, tmp_path / "none.h5"):
-        refused = run(*USUAL, "--kappa", "1e-5", "--out", path)
+        refused = run_here(DRIVER, *USUAL, "--kappa", "1e-5", "--out", path)
         assert refused.returncode == 1
         assert "kappa does not apply to the protocol quasistatic" in refused.stderr
 
 
-def test_a_finished_file_is_left_alone(made):
+def test_a_finished_file_is_left_alone(made, run_here):
     out, finished = made
     before = {path: (path.read_bytes(), path.stat().st_mtime_ns) for path in out.parent.iterdir()}
-    again = run(*SMALL, "--out", out)
+    again = run_here(DRIVER, *SMALL, "--out", out)
     assert (again.returncode, again.stdout) == (finished.returncode, finished.stdout)
     after = {path: (path.read_bytes(), path.stat().st_mtime_ns) for path in out.parent.iterdir()}
     assert after == before

@@ -55,10 +55,10 @@ def test_a_run_changes_its_rate_and_ends_where_it_was_told(made, start):
     assert read_packing(out, 0).phi == pytest.approx(read_packing(start).phi, rel=1e-15)
 
 
-def test_a_finished_run_is_left_alone(made):
+def test_a_finished_run_is_left_alone(made, run_here):
     out, options, finished = made
     before = out.read_bytes()
-    again = run(*options)
+    again = run_here(DRIVER, *options)
     assert again.returncode == 0
     assert again.stdout.splitlines()[-1] == finished.stdout.splitlines()[-1]
     assert out.read_bytes() == before

@@ -9,8 +9,10 @@ import time
 from pathlib import Path
 
 import pytest
+from in_process import jamshape
 from matplotlib.image import imread
 
+from jamshape.commands import sweep
 from jamshape.drawing.sweep import sweep_figure
 from jamshape.files.ensembles import PackingFile
 from jamshape.files.h5md import read_attributes, read_packing
@@ -19,7 +21,7 @@ pytestmark = pytest.mark.lammps
 
 DRIVER = Path(__file__).parents[2] / "pyscripts" / "sweep.py"
 FAST = ("--n", "16", "--phi-start", "0.55", "--u0", "1e-6")
-DYNAMICS = ("--protocol", "dynamics", "--kappa", "1e-5", "--p-end", "3e-3")  # takes seconds
+DYNAMICS = ("--protocol", "dynamics", "--kappa", "1e-5", "--p-end", "1e-3")  # takes seconds
 IMPOSSIBLE = "1e6"  # so long that it meets its own images in any direction
 
 
@@ -30,6 +32,12 @@ def command(out, *options):
 def run(out, *options):
     done = subprocess.run(command(out, *options), capture_output=True, text=True, check=False)
     return done, json.loads(done.stdout.splitlines()[-1]) if done.stdout else None
+
+
+def swept_here(out, *options):
+    """Run the command in this process, with one other process for the samples; return its exit code and its report."""
+    ended = jamshape("sweep", *options, *FAST, "--jobs", 1, "--out", out)
+    return ended.code, ended.report
 
 
 def times(folder):
@@ -74,27 +82,26 @@ def test_samples_that_fail_are_listed_and_do_not_stop_the_others(swept):
 def test_a_second_call_makes_nothing_anew(swept):
     out, *_ = swept
     before = times(out)
-    done, report = run(out, "--alpha", "0", "1", "--samples", "2")
-    assert (done.returncode, report["made"], report["failed"]) == (0, 4, [])
+    code, report = swept_here(out, "--alpha", "0", "1", "--samples", "2")
+    assert (code, report["made"], report["failed"]) == (0, 4, [])
     assert times(out) == before
 
 
 def test_packings_of_other_parameters_are_refused_and_kept(swept):
     out, *_ = swept
     before = times(out)
-    done, report = run(out, "--alpha", "0", "--samples", "1", "--size-ratio", "1.5")
-    assert (done.returncode, report["made"]) == (1, 0)
+    code, report = swept_here(out, "--alpha", "0", "--samples", "1", "--size-ratio", "1.5")
+    assert (code, report["made"]) == (1, 0)
     (complaint,) = report["failed"]
     assert "size_ratio = 1.4, expected 1.5" in complaint
     assert times(out) == before
 
 
-def test_a_damaged_file_is_listed_and_does_not_stop_the_others(tmp_path):
+def test_a_damaged_file_is_listed_and_does_not_stop_the_others(tmp_path, capfd):
     (tmp_path / "alpha0_seed1.h5").write_text("not HDF5")
-    done, report = run(tmp_path, "--alpha", "0", IMPOSSIBLE, "--samples", "1")
-    assert done.returncode == 1
-    assert "Traceback" not in done.stderr
-    assert report is not None, done.stderr
+    code, report = swept_here(tmp_path, "--alpha", "0", IMPOSSIBLE, "--samples", "1")
+    assert code == 1
+    assert "Traceback" not in capfd.readouterr().err
     assert report["made"] == 0
     assert {c.split("_")[0] for c in report["failed"]} == {"alpha0", "alpha1e+06"}
 
@@ -121,7 +128,7 @@ def wait_until(condition, seconds):
     "ending", [signal.SIGKILL, pytest.param(signal.SIGINT, marks=pytest.mark.validate)]
 )
 def test_a_sweep_that_is_killed_alone_leaves_no_process_and_goes_on(tmp_path, ending, measured):
-    samples = ("--alpha", "0", "1", "--samples", "2", *DYNAMICS)
+    samples = ("--alpha", "0", "--samples", "3", *DYNAMICS)
     with subprocess.Popen(
         command(tmp_path, *samples),
         stdout=subprocess.DEVNULL,
@@ -137,29 +144,30 @@ def test_a_sweep_that_is_killed_alone_leaves_no_process_and_goes_on(tmp_path, en
     measured(seconds_until_all_have_ended=time.monotonic() - killed)
     finished = {name: at for name, at in times(tmp_path).items() if name.count(".") == 1}
     done, report = run(tmp_path, *samples)
-    assert (done.returncode, report["made"], report["failed"]) == (0, 4, []), done.stderr
+    assert (done.returncode, report["made"], report["failed"]) == (0, 3, []), done.stderr
     after = times(tmp_path)
     assert {name: after[name] for name in finished} == finished
     assert not list(tmp_path.glob("*.making.h5"))
 
 
 def test_a_sweep_stops_in_time_and_goes_on(tmp_path):
-    asked = ("--alpha", "1", "--samples", "3")
+    asked = ("--alpha", "1", "--samples", "2")
     done, report = run(tmp_path, *asked, "--seconds", "0")
     assert done.returncode == 75
     assert report["made"] == 0
     assert sorted(report["failed"]) == [
-        f"alpha1_seed{seed}.h5: not begun in time" for seed in (1, 2, 3)
+        f"alpha1_seed{seed}.h5: not begun in time" for seed in (1, 2)
     ]
-    done, report = run(tmp_path, *asked, "--seconds", "300")
-    assert (done.returncode, report["made"], report["failed"]) == (0, 3, [])
+    code, report = swept_here(tmp_path, *asked, "--seconds", "300")
+    assert (code, report["made"], report["failed"]) == (0, 2, [])
 
 
-def test_phi_j_and_z_are_drawn_against_what_is_swept(tmp_path):
+def test_phi_j_and_z_are_drawn_against_what_is_swept(swept, tmp_path):
+    out, *_ = swept
     picture = tmp_path / "sweep.png"
-    done, report = run(tmp_path, "--alpha", "0", "1", "--samples", "2", "--plot", str(picture))
-    assert (done.returncode, report["made"]) == (0, 4), done.stderr
-    files = [PackingFile.read(path) for path in sorted(tmp_path.glob("alpha*_seed?.h5"))]
+    code, report = swept_here(out, "--alpha", "0", "1", "--samples", "2", "--plot", picture)
+    assert (code, report["made"]) == (0, 4)
+    files = [PackingFile.read(path) for path in sorted(out.glob("alpha[01]_seed[12].h5"))]
     above, below = sweep_figure(files).axes
     assert below.get_xlabel() == r"$\alpha$"
     for axes, name in ((above, "phi_J"), (below, "z")):
@@ -173,36 +181,37 @@ def test_phi_j_and_z_are_drawn_against_what_is_swept(tmp_path):
     assert imread(picture).std() > 0
 
 
-def test_names_of_files_keep_all_digits_and_options_given_twice_add_up(tmp_path):
-    done, report = run(
+def test_names_of_files_keep_all_digits_and_options_given_twice_add_up(tmp_path, capfd):
+    _, report = swept_here(
         tmp_path, *("--alpha", "1", "1.0000001", "1e0", "--alpha", "1e6", "--samples", "1")
     )
     assert report["made"] == 2
     assert {c.split(":")[0] for c in report["failed"]} == {"alpha1e+06_seed1.h5"}
     found = {p.name: read_attributes(p)["alpha"] for p in tmp_path.glob("alpha*_seed1.h5")}
     assert found == {"alpha1_seed1.h5": 1.0, "alpha1.0000001_seed1.h5": 1.0000001}
-    assert "packings: 100.0 %" in done.stderr
-    assert "3 of 3, 1 failed" in done.stderr
+    said = capfd.readouterr().err
+    assert "packings: 100.0 %" in said
+    assert "3 of 3, 1 failed" in said
 
 
 def test_seeds_begin_where_they_are_asked_to(swept, tmp_path):
     out, *_ = swept
-    done, report = run(tmp_path, "--alpha", "0", "--first-seed", "2", "--samples", "2")
-    assert (done.returncode, report["made"]) == (0, 2)
+    code, report = swept_here(tmp_path, "--alpha", "0", "--first-seed", "2", "--samples", "2")
+    assert (code, report["made"]) == (0, 2)
     names = {path.name for path in tmp_path.glob("*.h5") if path.name.count(".") == 1}
     assert names == {"alpha0_seed2.h5", "alpha0_seed3.h5"}
     same = [read_packing(folder / "alpha0_seed2.h5").position for folder in (out, tmp_path)]
     assert (same[0] == same[1]).all()
 
 
-def test_a_sample_that_another_process_makes_is_told(tmp_path):
-    log = tmp_path / "alpha0_seed1.log"
+def test_a_sample_that_another_process_makes_is_told(tmp_path, monkeypatch):
+    monkeypatch.setattr(sweep, "_PATIENCE", 0.1)
+    file, log = tmp_path / "alpha0_seed1.h5", tmp_path / "alpha0_seed1.log"
+    words = ["--alpha", "0", *FAST, "--out", str(file)]
     with log.open("a") as held:
         fcntl.flock(held, fcntl.LOCK_EX)
-        done, report = run(tmp_path, "--alpha", "0", "--samples", "1")
-    assert done.returncode == 1
-    (complaint,) = report["failed"]
-    assert complaint == (
+        complaint = sweep.sample(words, file, None)
+    assert complaint == sweep.Complaint(
         "alpha0_seed1.h5: another process is making it, expected none; wait until it ends"
     )
     assert {path.name for path in tmp_path.iterdir()} == {log.name}

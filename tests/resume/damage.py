@@ -1,15 +1,8 @@
-"""Damaged and hostile files, read by every reader in a process of its own: python damage.py KIND FILE FOLDER JOBS.
-
-JOBS is a JSON list: ["flip", SEED], ["cut", LENGTH], or ["read", NAME] for another file of the folder. The result, a JSON list
-with an item for each job, is written to its end on standard output: how many readers returned the original
-content and how many refused the file with one sentence, and complaints about all others.
-"""
+"""Damaged and hostile files, read by every reader in a process of its own."""
 
 import json
 import resource
-import sys
 from functools import partial
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -156,21 +149,22 @@ def tried(job, kind, whole, path, originals):
     return result
 
 
-def main():
-    kind, file, folder, jobs = sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3]), sys.argv[4]
+def read_all(kind, file, folder, jobs):
+    """Read damaged files of a kind, and write what came of it as results.json of the folder.
+
+    A job is ["flip", SEED], ["cut", LENGTH], or ["read", NAME] for another file of the folder. Results, an item for each job,
+    are how many readers returned the original content and how many refused the file with one sentence, and complaints
+    about all others; beside them are readers that refuse the original.
+    """
     whole, path = file.read_bytes(), folder / f"{kind}.h5"
     path.write_bytes(whole)
     originals = {name: outcome_of(read, path) for name, read in readers_of(kind).items()}
     originals["h5py"] = by_h5py(path)
     before, results = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, []
-    for job in json.loads(Path(jobs).read_text()):
+    for job in jobs:
         results.append(tried(job, kind, whole, path, originals))
         grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
         if grown > 300_000:  # kB
             results[-1]["faults"].append(f"took {grown} kB of memory")
     refused = [name for name, found in originals.items() if isinstance(found, Exception)]
-    print(json.dumps({"refused": refused, "results": results}))
-
-
-if __name__ == "__main__":
-    main()
+    (folder / "results.json").write_text(json.dumps({"refused": refused, "results": results}))

@@ -23,7 +23,7 @@ NONE = ((f"{RECORDER}.PAUSE", 1e9), (f"{RECORDER}.SECONDS", 1e9))
 """No checkpoint before the end."""
 SHORT = (
     ("jamshape.flow.implicit_driver.STEPS_PER_MARK", 40),
-    ("jamshape.flow.lammps_driver.EVALUATIONS_PER_MARK", 400),
+    ("jamshape.flow.lammps_driver.EVALUATIONS_PER_MARK", 800),
 )
 """Marks close to each other."""
 FAR = (
@@ -168,7 +168,7 @@ DRIVERS = {
     ),
     "quasistatic shear": Case(
         "quasistatic_shear", "dimers",
-        {"step": 2e-2, "strain": 0.16, "frames": 5},
+        {"step": 2e-2, "strain": 0.1, "frames": 5},
         {"step": 1e-2, "strain": 0.5, "flow": "pure", "pressure": 1e-3, "tolerance": 1e-9, "frames": 4},
         {"step": 1e-3, "strain": 1000.0},
     ),

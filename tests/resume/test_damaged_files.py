@@ -4,8 +4,6 @@ All files of a kind are read in one process of their own, which must survive.
 """
 
 import json
-import subprocess
-import sys
 import zlib
 from functools import cache
 from pathlib import Path
@@ -13,6 +11,7 @@ from pathlib import Path
 import damage
 import numpy as np
 import pytest
+from killing import ended, forked, said
 
 import jamshape as js
 from jamshape.checks import TimeLimitError
@@ -23,7 +22,7 @@ pytestmark = pytest.mark.lammps
 
 KINDS = ("packing", "run", "unfinished", "modes", "mdanalysis")
 COUNTS = [
-    pytest.param((10, 10), id="few"),
+    pytest.param((8, 6), id="few"),
     pytest.param((200, 40), id="many", marks=pytest.mark.validate),
 ]
 """Numbers of files with a flipped bit, and of truncated files."""
@@ -47,12 +46,9 @@ def files(tmp_path_factory):
 
 def read_in_a_process(kind, file, folder, jobs):
     """Read damaged files with all readers; return the results in order, and readers that never read this kind."""
-    listed = folder / "jobs.json"
-    listed.write_text(json.dumps(jobs))
-    command = [sys.executable, damage.__file__, kind, str(file), str(folder), str(listed)]
-    ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=1800)
-    assert ended.returncode == 0, ended.stderr[-2000:]
-    found = json.loads(ended.stdout)
+    log = folder / "said.log"
+    assert ended(forked(damage.read_all, (kind, file, folder, jobs), log), 1800) == 0, said(folder)
+    found = json.loads((folder / "results.json").read_text())
     return found["results"], found["refused"]
 
 

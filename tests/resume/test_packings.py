@@ -32,7 +32,7 @@ PACKINGS = {
         js.Superellipsoids(p=1.5),
         {"n": 12, "protocol": 2, "phi_start": 0.3, "phi_thermal": 0.4, "n_sweeps": 60, "delta_phi": 2e-2},
     ),
-    "dynamics": (RODS, QUICK | {"protocol": "dynamics", "kappa": 1e-5, "p_end": 3e-3}),
+    "dynamics": (RODS, QUICK | {"protocol": "dynamics", "kappa": 1e-5, "p_end": 1e-3}),
     "marschall-2018": (
         RODS,
         QUICK | {"u0": 1.5e-6, "protocol": "marschall-2018", "kappa": 1e-4, "search": "bisection"},

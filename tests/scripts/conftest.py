@@ -9,6 +9,7 @@ import pytest
 from figures import NO_PACKINGS, require_told
 from matplotlib.figure import Figure
 
+DRAW = Figure.savefig
 ANALYSIS = Path(__file__).parents[2] / "analysis"
 PAPERS = (
     "marschall_2018", "yuan_2019", "vanderwerf_2018", "zhang_2021", "marschall_shear", "brito_2018",
@@ -34,14 +35,29 @@ def here(monkeypatch):
 
 
 @pytest.fixture
-def report(here, capsys, monkeypatch):
+def undrawn(monkeypatch):
+    """Leave out the drawing, which other tests look at."""
+    monkeypatch.setattr(Figure, "savefig", lambda _, place, **__: Path(place).touch())
+
+
+@pytest.fixture(scope="session")
+def laid_out():
+    """Scripts whose figures were laid out."""
+    return set()
+
+
+@pytest.fixture
+def report(here, capsys, monkeypatch, laid_out):
     """Run a script that must succeed; return its last line, which is JSON without NaN.
 
-    A figure of a paper, whichever test draws it, must tell what it is of and what its colours are.
+    A figure of a paper, whichever test draws it, must tell what it is of and what its colours are. Only the first call
+    of a script lays its figures out, which takes as long as to draw them.
     """
-    figures, save = [], Figure.savefig
+    figures, save, running = [], Figure.savefig, []
 
     def saved(figure, *arguments, **options):
+        if laid_out.issuperset(running):
+            figure.set_layout_engine("none")
         save(figure, *arguments, **options)
         figures.append(figure)
 
@@ -49,7 +65,10 @@ def report(here, capsys, monkeypatch):
 
     def reported(script, *arguments):
         figures.clear()
+        running[:] = [script]
         assert here(script, *arguments) == 0
+        if save is DRAW:
+            laid_out.add(script)
         if Path(script).parent.name in PAPERS and Path(script).stem not in NO_PACKINGS:
             for figure in figures:
                 require_told(script, figure)

@@ -161,7 +161,7 @@ def test_every_shape_in_the_plane_and_in_space(report, tmp_path, case, colors):
     for one in colors:
         color = HIGHER[dimension] if one == "S4" else one
         out = tmp_path / f"{color}.png"
-        asked = ("--color", color, "--dpi", 80, *(("--level", 2) if dimension == 3 else ()))
+        asked = ("--color", color, "--dpi", 60, *(("--level", 2) if dimension == 3 else ()))
         found = report(SCRIPT, path, *asked, "--out", out)
         assert (found["shape"], found["dimension"]) == (shape, dimension)
         assert ("mean_local" in found) == (color in orders)

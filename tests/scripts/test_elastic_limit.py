@@ -12,11 +12,11 @@ SCRIPT = "shear/elastic_limit.py"
 
 def test_cycles_below_the_limit_are_elastic_and_cycles_beyond_are_not():
     packing = js.make_packing(js.Spherocylinders(alpha=0), n=12, u0=1e-4, progress=False)
-    found = elastic_limit(packing, accuracy=0.1, steps=20)
+    found = elastic_limit(packing, accuracy=0.1, steps=12)
     assert 0 < found.low < found.high <= 1.1 * found.low
     assert found.error < 0.05 * found.value
     for amplitude, expected in ((0.3 * found.low, True), (1.5 * found.high, False)):
-        assert is_elastic(packing, amplitude, steps=20) == expected
+        assert is_elastic(packing, amplitude, steps=12) == expected
 
 
 def test_a_limit_outside_the_range_of_amplitudes_is_open():

@@ -23,7 +23,7 @@ def sweep(tmp_path_factory):
     folder = tmp_path_factory.mktemp("shapes")
     for k, shape in enumerate(SHAPES.values()):
         file = folder / f"{k}.h5"
-        js.make_packing(shape, n=24, seed=1, dimension=2, u0=1e-15, file=file, progress=False)
+        js.make_packing(shape, n=16, seed=1, dimension=2, u0=1e-15, file=file, progress=False)
     return folder
 
 

@@ -23,7 +23,7 @@ def sweep(tmp_path_factory):
             file = folder / f"{alpha}_{seed}.h5"
             shape = js.Spherocylinders(alpha=alpha, size_ratio=1)
             js.make_packing(
-                shape, n=24, seed=seed, dimension=3, u0=1e-15, file=file, progress=False
+                shape, n=16, seed=seed, dimension=3, u0=1e-15, file=file, progress=False
             )
     return folder
 

@@ -112,6 +112,7 @@ def test_pressure_of_samples(report, tmp_path):
     image(tmp_path / "p.png")
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_pressure_of_other_ensembles_has_no_mean(report, tmp_path):
     runs = [compression(tmp_path / f"{alpha}.h5", alpha=alpha) for alpha in (1.0, 4.0)]
     assert report(PRESSURE, *runs, "--out", tmp_path / "p.png")["mean"] is None
@@ -142,6 +143,7 @@ def test_order_of_samples(report, tmp_path):
     image(tmp_path / "order.png")
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_order_of_one_run_and_of_runs_that_do_not_overlap(report, problem, tmp_path):
     one = compression(tmp_path / "one.h5")
     (found,) = report(ORDER, one, "--out", tmp_path / "order.png")["ensembles"]
@@ -184,6 +186,7 @@ def test_rates_are_compared_sample_by_sample(report, rates, tmp_path):
     image(tmp_path / "slow.png")
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_steps_of_heun_are_counted_at_the_rates_that_held(report, tmp_path):
     cost = {"flow_evaluations": 10, "flow_wall_seconds": 1.5}
     kappa = np.array([[0.0, 1e-6], [0.85, 1e-8]])
@@ -207,6 +210,7 @@ def test_one_sample_has_the_error_of_its_fit_and_packings_are_marked(here, capsy
     image(tmp_path / "slow.png")
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_phi_j_by_frames_is_between_the_last_that_unjams_and_the_first_that_stays(report, tmp_path):
     jams = ((0.860, 0.862), (0.864, 0.868))
     runs = [
@@ -220,6 +224,7 @@ def test_phi_j_by_frames_is_between_the_last_that_unjams_and_the_first_that_stay
     assert found["error"] == pytest.approx(np.sqrt(0.0025**2 + (0.002**2 + 0.004**2) / 2 / 12))
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_runs_without_a_bracket_tell_no_phi_j_by_frames(report, tmp_path):
     one_end = Jamming(0.86, np.nan, 3).attributes()
     runs = [compression(tmp_path / "0.h5", 0, **one_end), compression(tmp_path / "1.h5", 1)]
@@ -239,6 +244,7 @@ def test_zeros_of_lines_depend_on_their_pressures_only_where_the_curve_bends(rep
     image(tmp_path / "lines.png")
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_window_that_the_pressure_does_not_reach_has_no_line(report, problem, tmp_path):
     run_file = compression(tmp_path / "run.h5")
     asked = (LINES, run_file, "--out", tmp_path / "lines.png", "--windows")
@@ -253,7 +259,7 @@ def test_a_packing_is_compressed_by_steps_and_opened_to_its_energy(report, probl
     particles = js.Spherocylinders(alpha=1)
     for seed in (1, 2):
         place = tmp_path / f"{seed}.h5"
-        js.make_packing(particles, n=24, u0=1e-10, seed=seed, progress=False, file=place)
+        js.make_packing(particles, n=16, u0=1e-10, seed=seed, progress=False, file=place)
     packings = [tmp_path / "1.h5", tmp_path / "2.h5"]
     first = [js.load(path).results["phi_J"] for path in packings]
     end = max(first) + 0.02

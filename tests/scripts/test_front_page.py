@@ -14,9 +14,9 @@ PICTURE = re.compile(r"pictures/(front_\w+\.png)")
 
 
 def of_few_particles(monkeypatch):
-    """Make every packing of a quarter of its particles, which are sheared in ten times larger steps."""
+    """Make every packing of an eighth of its particles, which are sheared in ten times larger steps."""
     make, shear = js.make_packing, js.quasistatic_shear
-    monkeypatch.setattr(js, "make_packing", lambda shape, n, **more: make(shape, n=n // 4, **more))
+    monkeypatch.setattr(js, "make_packing", lambda shape, n, **more: make(shape, n=n // 8, **more))
     monkeypatch.setattr(js, "quasistatic_shear", lambda step, **more: shear(step=10 * step, **more))
 
 

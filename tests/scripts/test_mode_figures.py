@@ -144,8 +144,10 @@ def test_density_of_states(report, modes, tmp_path):
 
 
 def test_bands_of_one_curve_are_named_with_their_fractions(here, modes, tmp_path, monkeypatch):
-    figures, save = [], Figure.savefig
-    monkeypatch.setattr(Figure, "savefig", lambda f, *a, **k: (figures.append(f), save(f, *a, **k)))
+    figures = []  # whose words are known before they are drawn
+    monkeypatch.setattr(
+        Figure, "savefig", lambda figure, place, **_: (figures.append(figure), Path(place).touch())
+    )
     assert here(STATES, modes, "--alpha", 4, "--u0", U0, "--out", tmp_path / "one.png") == 0
     total = sum(BANDS.values())
     for band, count in BANDS.items():
@@ -163,6 +165,7 @@ def test_density_is_normalised(modes):
     assert_allclose((sum(both) * np.diff(edges)).sum(axis=1), 1)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_participation(report, modes, tmp_path):
     rows = report(PARTICIPATION, modes, "--out", tmp_path / "a.png")["participation"]
     for row in rows:
@@ -170,6 +173,7 @@ def test_participation(report, modes, tmp_path):
         assert_allclose(row["low"]["value"], 1 / N)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_components(report, modes, tmp_path):
     arguments = (modes, "--alpha", 4, "--u0", U0, 1e-12, "--out", tmp_path / "a.png")
     for row in report(COMPONENTS, *arguments)["components"]:
@@ -216,6 +220,7 @@ def test_jamming_distance(report, problem, tmp_path):
     assert "no sample at two energies" in problem(DISTANCE, one, "--out", out)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_modes_of_a_packing(report, problem, jammed, tmp_path):
     folder, table = jammed
     packing, out = folder / "packing.h5", tmp_path / "a.png"

@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import h5py
 import numpy as np
@@ -18,9 +19,24 @@ from jamshape.vibration.table import BANDS, read_modes
 ANALYSIS = Path(__file__).parents[2] / "analysis"
 
 
-def run(*arguments, script="modes.py"):
-    command = [sys.executable, "-W", "error", ANALYSIS / script, *map(str, arguments)]
+def run_apart(*arguments):
+    command = [sys.executable, "-W", "error", ANALYSIS / "modes.py", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+
+@pytest.fixture
+def run(here, capfd):
+    """Run the script in this process; return how it ended, as `subprocess.run` does."""
+
+    def ended(*arguments):
+        capfd.readouterr()
+        code = here("modes.py", *arguments)
+        said = capfd.readouterr()
+        if isinstance(code, str):
+            return CompletedProcess(arguments, 1, said.out, f"{said.err}{code}\n")
+        return CompletedProcess(arguments, code, said.out, said.err)
+
+    return ended
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +50,7 @@ def packing(tmp_path_factory):
 def analysed(packing):
     out = packing.with_name("modes.h5")
     plot = packing.with_name("modes.png")
-    return out, plot, run(packing, "--out", out, "--plot", plot, "--vectors")
+    return out, plot, run_apart(packing, "--out", out, "--plot", plot, "--vectors")
 
 
 def test_file_holds_every_mode_with_its_error(analysed, packing):
@@ -73,7 +89,7 @@ def test_summary_and_last_line(analysed):
 
 
 @pytest.mark.parametrize("method", ["refined", "plain", "first_order"])
-def test_other_methods(packing, tmp_path, analysed, method):
+def test_other_methods(run, packing, tmp_path, analysed, method):
     done = run(packing, "--out", tmp_path / "m.h5", "--method", method)
     assert (done.returncode, done.stderr) == (0, "")
     one, other = read_modes(analysed[0]), read_modes(tmp_path / "m.h5")
@@ -83,7 +99,7 @@ def test_other_methods(packing, tmp_path, analysed, method):
 
 
 @pytest.mark.parametrize("omega", [None, 1.0])
-def test_a_few_modes_alone(packing, tmp_path, analysed, omega):
+def test_a_few_modes_alone(run, packing, tmp_path, analysed, omega):
     whole = read_modes(analysed[0])
     real = whole["eigenvalues"][~whole["is_translation"].astype(bool)]
     expected = np.sort(real[np.argsort(np.abs(real - (omega or 0.0) ** 2))[:4]])
@@ -99,7 +115,7 @@ def test_a_few_modes_alone(packing, tmp_path, analysed, omega):
     json.loads(done.stdout.splitlines()[-1], parse_constant=pytest.fail)
 
 
-def test_a_state_that_is_no_minimum_needs_force(packing, tmp_path):
+def test_a_state_that_is_no_minimum_needs_force(run, packing, tmp_path):
     there = read_packing(packing)
     moved = there.with_(position=there.position + 1e-6 * np.sin(np.arange(32).reshape(16, 2)))
     path, out = tmp_path / "moved.h5", tmp_path / "m.h5"
@@ -116,7 +132,7 @@ def test_a_state_that_is_no_minimum_needs_force(packing, tmp_path):
     assert out.exists()
 
 
-def test_problems_are_one_sentence(packing, tmp_path):
+def test_problems_are_one_sentence(run, packing, tmp_path):
     wide = random_packing(8, 0.1, 1, bidisperse(1))
     write_packing(tmp_path / "wide.h5", wide)
     (tmp_path / "text.h5").write_text("no")
@@ -142,7 +158,7 @@ def test_files_that_are_not_of_modes_are_refused(packing, tmp_path):
         read_modes(tmp_path / "empty.h5")
 
 
-def test_modes_of_other_shapes_in_space(tmp_path):
+def test_modes_of_other_shapes_in_space(run, tmp_path):
     landscape, minimum = jam(superellipsoids(1.0, 0.7), 12, 0.6, 1e-10, dimension=3)
     path = tmp_path / "packing.h5"
     write_packing(path, minimum.state.packing(landscape.particles), {"exponent": 1.0, "w1": 0.7})

@@ -33,10 +33,18 @@ def out(tmp_path_factory):
     return tmp_path_factory.mktemp("out") / "new"
 
 
+@pytest.fixture(scope="module")
+def reports():
+    """What the script told when it was run in `made`."""
+    return []
+
+
 @pytest.fixture
-def made(report, sweep, out):
+def made(report, sweep, out, reports):
     """Packings of rods, made by the first test that asks."""
-    return out, report(SCRIPT, sweep, "--out", out)
+    if not reports:
+        reports.append(report(SCRIPT, sweep, "--out", out))
+    return out, *reports
 
 
 def test_help(help_of):

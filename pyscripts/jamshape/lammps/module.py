@@ -92,16 +92,23 @@ def start_lammps(arguments: list[str]) -> Any:
 _one_at_a_time = threading.RLock()
 
 
+@functools.cache
+def _locales() -> ctypes.CDLL:
+    """Load the C functions for locales, once: every call of LAMMPS needs them."""
+    c = ctypes.CDLL(None)
+    c.uselocale.argtypes = c.duplocale.argtypes = c.freelocale.argtypes = [ctypes.c_void_p]
+    c.newlocale.argtypes = [ctypes.c_int, ctypes.c_char_p, ctypes.c_void_p]
+    c.uselocale.restype = c.duplocale.restype = c.newlocale.restype = ctypes.c_void_p
+    return c
+
+
 @contextmanager
 def _decimal_point() -> Iterator[None]:
     """Use a decimal point in C code of this thread, whatever LC_NUMERIC the host program has set.
 
     LAMMPS reads "0.5" as 0 under a decimal comma.
     """
-    c = ctypes.CDLL(None)
-    c.uselocale.argtypes = c.duplocale.argtypes = c.freelocale.argtypes = [ctypes.c_void_p]
-    c.newlocale.argtypes = [ctypes.c_int, ctypes.c_char_p, ctypes.c_void_p]
-    c.uselocale.restype = c.duplocale.restype = c.newlocale.restype = ctypes.c_void_p
+    c = _locales()
     before = c.uselocale(None)
     point = c.newlocale(1 << locale.LC_NUMERIC, b"C", c.duplocale(before))
     c.uselocale(point)
