@@ -80,10 +80,12 @@ def figure_from(found: Sequence[Shape], title: str, fit_to: float) -> Figure:
     for k, one in enumerate(found):
         style, fit = marked(k), one.G.fit
         name = rf"{family(one.system)}, $\Delta={one.Delta:.2g}$"
-        power = rf"$G_0+c\,p^{{{fit.beta:.2f}\pm{one.G.errors.beta:.2f}}}$"
+        power = "too few pressures for a fit"
+        if np.isfinite(fit.beta):
+            power = rf"$G_0+c\,p^{{{fit.beta:.2f}\pm{one.G.errors.beta:.2f}}}$"
+            p = np.geomspace(one.p[0], fit_to, 60)
+            left.plot(p, fit.G_0 + fit.c * p**fit.beta, lw=0.8, color=style["color"])
         _draw(left, one, 0.0, style | {"label": f"{name}: {power}"})
-        p = np.geomspace(one.p[0], fit_to, 60)
-        left.plot(p, fit.G_0 + fit.c * p**fit.beta, lw=0.8, color=style["color"])
         if one.Delta > 0:
             _draw(right, one, 0.5, style | {"label": name})
     low, high = right.get_xlim()

@@ -105,10 +105,9 @@ def main(options: Namespace) -> None:
     save_figure(figure_for(limits, options), picture)
     rows = []
     for alpha, found in limits.items():
-        at = [one.value if one.is_enclosed else np.nan for one in found]
-        rows.append(
-            {"alpha": alpha, "amplitude": mean(at), "median": np.nanmedian(at), "limits": found}
-        )
+        at = [one.value for one in found if one.is_enclosed]
+        median = float(np.median(at)) if at else np.nan
+        rows.append({"alpha": alpha, "amplitude": mean(at), "median": median, "limits": found})
     report({"out": picture, "n": options.n, "u0": options.u0, "elastic_limits": rows})
 
 

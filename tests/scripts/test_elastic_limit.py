@@ -51,3 +51,11 @@ def test_the_script_finds_limits_once(report, tmp_path):
     times = {path: path.stat().st_mtime_ns for path in tmp_path.glob("*_seed*")}
     assert report(SCRIPT, *words) == found
     assert {path: path.stat().st_mtime_ns for path in times} == times
+
+
+def test_packings_without_a_limit_have_no_average(report, tmp_path):
+    open_above = '{"low": 0.256, "high": null, "cycles": 2}'
+    (tmp_path / "alpha0_n12_u1e-06_seed1_0.5_5.json").write_text(open_above)
+    words = ("--n", 12, "--u0", 1e-6, "--samples", 1, "--accuracy", 0.5, "--steps", 5)
+    (row,) = report(SCRIPT, "--alpha", 0, *words, "--out", tmp_path)["elastic_limits"]
+    assert (row["amplitude"]["value"], row["median"]) == (None, None)

@@ -88,6 +88,8 @@ def test_shear_modulus_of_each_shape(report, sweep, tmp_path):
     G = np.mean([of.B.G_dc.relaxed / of.bulk.relaxed for of in moduli])
     assert discs["points"][1]["G"] == pytest.approx(G, rel=1e-6)
     assert discs["points"][0]["p"] < 1e-2 * discs["points"][1]["p"] * 1.1
+    found = report(f"{FOLDER}/shear_modulus.py", ladder, "--fit-to", 1e-9, "--out", out)
+    assert [one["beta"] for one in found["shapes"]] == [None, None]  # no pressure to fit
 
 
 @pytest.mark.parametrize("theta", [-0.41, 0.0, 0.175, 0.423])
