@@ -35,7 +35,7 @@ from jamshape.vibration.table import read_modes
 SHAPE = ("alpha", "exponent", "w1", "w2", "size_ratio", "n", "seed")
 STYLE = ("shape", "dimension")
 PACKING = (
-    *STYLE, *SHAPE, "asphericity", "beta", "z_iso", "protocol", "phi_thermal", "n_sweeps", "u0", "u", "pressure", "phi", "phi_J", "z", "z_single",
+    *STYLE, *SHAPE, "aspect_ratio", "asphericity", "beta", "z_iso", "protocol", "phi_thermal", "n_sweeps", "u0", "u", "pressure", "phi", "phi_J", "z", "z_single",
     "z_bearing", "n_rattlers", "n_bonds", "S2", "S4", "C4", "residual_force", "residual_torque", "tolerance", "outcome", "wall_seconds",
 )  # fmt: skip
 RUN = (
@@ -57,8 +57,10 @@ AT_PRESSURE = ("G", "slope")
 
 
 def told_packing(path: Path) -> dict[str, Any]:
-    """Read what a packing is."""
-    return dict(zip(STYLE, read_style(path), strict=True)) | read_attributes(path)
+    """Read what a packing is; nan is told, as of the order of discs, so that averages leave it out."""
+    found = dict(zip(STYLE, read_style(path), strict=True)) | read_attributes(path)
+    is_nan = {name: isinstance(value, float) and math.isnan(value) for name, value in found.items()}
+    return {name: "nan" if is_nan[name] else value for name, value in found.items()}
 
 
 def told_run(path: Path) -> dict[str, Any] | None:

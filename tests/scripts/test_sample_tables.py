@@ -61,6 +61,17 @@ def test_each_file_is_a_line(folder, report):
     assert "w1" not in packing  # no file has one
 
 
+def test_the_order_of_discs_is_nan_and_their_shape_is_told(report, tmp_path):
+    file = tmp_path / "packings" / "discs" / "alpha0_seed1.h5"
+    file.parent.mkdir(parents=True)
+    js.make_packing(js.Spherocylinders(alpha=0), n=12, u0=1e-6, file=file, progress=False)
+    report(SCRIPT, tmp_path, "--out", tmp_path)
+    [discs] = table(tmp_path / "discs.csv")
+    assert (discs["S2"], discs["aspect_ratio"], discs["asphericity"]) == ("nan", "1", "1")
+    [(_, [row])] = read_groups([tmp_path / "discs.csv"], needs=("S2",)).items()
+    assert np.isnan(row.number("S2"))
+
+
 def test_runs_that_were_not_finished_are_left_out(folder, report):
     report(SCRIPT, folder, "--out", folder / "samples")
     [run] = table(folder / "samples" / "runs.csv")
