@@ -10,7 +10,6 @@ from every_shape import (
     MIXTURES,
     SIDES,
     TYPICAL,
-    Case,
     close_to,
     particles_of,
     pressed,
@@ -191,7 +190,7 @@ def test_all_integrators_agree_on_the_pressure(case, measured):
 
 
 # Each shape, and a mixture in each dimension.
-YIELDING = quick(CASES, {*TYPICAL, Case("clump", 2, None), Case("superellipsoid", 3, None)})
+YIELDING = quick(CASES, {*TYPICAL, *{case.dimension: case for case in MIXTURES}.values()})
 
 
 @pytest.mark.parametrize("case", YIELDING, ids=str)
