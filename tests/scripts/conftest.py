@@ -6,15 +6,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from figures import NO_PACKINGS, require_told
+from figures import ANALYSIS, NO_PACKINGS, PAPERS, require_told
 from matplotlib.figure import Figure
 
 DRAW = Figure.savefig
-ANALYSIS = Path(__file__).parents[2] / "analysis"
-PAPERS = (
-    "marschall_2018", "yuan_2019", "vanderwerf_2018", "zhang_2021", "marschall_shear", "brito_2018",
-    "rocks_hoy_2023", "heussinger_2020",
-)  # fmt: skip
 
 
 @pytest.fixture

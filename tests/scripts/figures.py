@@ -1,6 +1,7 @@
 """Checks of finished figures: their text, and colours of lines and points without a name."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 from matplotlib.colors import to_rgb
@@ -8,6 +9,11 @@ from matplotlib.container import ErrorbarContainer
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
+ANALYSIS = Path(__file__).parents[2] / "analysis"
+PAPERS = (
+    "marschall_2018", "yuan_2019", "vanderwerf_2018", "zhang_2021", "marschall_shear", "brito_2018",
+    "rocks_hoy_2023", "heussinger_2020",
+)  # fmt: skip
 NO_PACKINGS = ("fig02_shapes",)  # of single particles
 
 # What tells under which conditions packings were made; u on an axis has values of its own.

@@ -3,8 +3,7 @@
 import re
 
 import pytest
-from conftest import ANALYSIS, PAPERS
-from figures import require_told, unnamed, words
+from figures import ANALYSIS, PAPERS, require_told, unnamed, words
 from matplotlib.figure import Figure
 
 TOLD = "spherocylinders in 2D, $\\alpha=4$\n$N=64$, $\\kappa=10^{-6}$"
