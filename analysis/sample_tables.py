@@ -59,8 +59,8 @@ AT_PRESSURE = ("G", "slope")
 def told_packing(path: Path) -> dict[str, Any]:
     """Read what a packing is; nan is told, as of the order of discs, so that averages leave it out."""
     found = dict(zip(STYLE, read_style(path), strict=True)) | read_attributes(path)
-    is_nan = {name: isinstance(value, float) and math.isnan(value) for name, value in found.items()}
-    return {name: "nan" if is_nan[name] else value for name, value in found.items()}
+    nan = {name: "nan" for name, x in found.items() if isinstance(x, float) and math.isnan(x)}
+    return found | nan
 
 
 def told_run(path: Path) -> dict[str, Any] | None:

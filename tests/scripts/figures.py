@@ -9,11 +9,10 @@ from matplotlib.container import ErrorbarContainer
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
+from jamshape.commands import reproduce
+
 ANALYSIS = Path(__file__).parents[2] / "analysis"
-PAPERS = (
-    "marschall_2018", "yuan_2019", "vanderwerf_2018", "zhang_2021", "marschall_shear", "brito_2018",
-    "rocks_hoy_2023", "heussinger_2020",
-)  # fmt: skip
+PAPERS = tuple(name.replace("-", "_") for name in reproduce.PAPERS)
 NO_PACKINGS = ("fig02_shapes",)  # of single particles
 
 # What tells under which conditions packings were made; u on an axis has values of its own.
