@@ -10,6 +10,8 @@ from jamshape.landscape import Evaluation
 from jamshape.minima.descent import History, Minimum, Outcome, Residual
 from jamshape.minima.target import Leading, Search
 
+_MINIMA = "start", "jammed", "best", "unfinished"  # of `Leading`
+
 
 def told_minimum(minimum: Minimum | None) -> dict[str, Any] | None:
     """Return a minimum without its history; None for None."""
@@ -37,7 +39,7 @@ def told_search(search: Search) -> dict[str, Any]:
     del found["history"]
     if search.leading:
         leading = vars(search.leading)
-        minima = {name: told_minimum(leading[name]) for name in ("start", "jammed", "best")}
+        minima = {name: told_minimum(leading[name]) for name in _MINIMA}
         found["leading"] = leading | minima
     return found | {"minimum": told_minimum(search.minimum)}
 
@@ -46,8 +48,6 @@ def search_of(told: Mapping[str, Any], history: History) -> Search:
     """Return a search with its history."""
     found = dict(told) | {"minimum": minimum_of(told.get("minimum"), history), "history": history}
     if leading := told.get("leading"):
-        minima = {
-            name: minimum_of(leading.get(name), history) for name in ("start", "jammed", "best")
-        }
+        minima = {name: minimum_of(leading.get(name), history) for name in _MINIMA}
         found["leading"] = Leading(**leading | minima)
     return Search(**found)

@@ -47,6 +47,10 @@ _FALLEN = 1e-2
 # Likewise for this fraction of the energy that a compression step adds to a jammed packing.
 _UNJAMMED = 1e-3
 
+# A packing whose energy falls below this fraction of the expected one slides, and is compressed back to it, at most so many
+# times: at a fixed box the forces that drive the slide would fade, and with them its speed.
+_SLID, _MOST_PARTS = 0.7, 100
+
 # Relative accuracy of the predicted displacements as the box is strained.
 _PREDICTION = 1e-3
 
@@ -334,8 +338,8 @@ class Leading:
     """A minimum on its way to u0, between two minimisations, with all that is needed to resume it.
 
     The box is strained to where the root of u that is linear in the strain reaches that of u0. Where that opens the
-    packing, fractions of the strain are tried. A minimum that stalls at u0, where a contact is about to open or close,
-    is approached again from a higher energy.
+    packing, fractions of the strain are tried. One that slides is compressed meanwhile, at about equal energy. A
+    minimum that stalls at u0, where a contact is about to open or close, is approached again from a higher energy.
 
     Parameters
     ----------
@@ -353,6 +357,8 @@ class Leading:
         Fraction of the strain to u0 to take, and how many fractions were tried.
     tolerance, aim
         Residual and energy density to reach.
+    unfinished, root, parts
+        State of a packing that slides, if it does; the root of u at which it is held, and how often it was minimised there.
     n_minima
         Minimisations of this approach.
     least, stalls
@@ -368,38 +374,55 @@ class Leading:
     tries: int = 1
     tolerance: float = 0.0
     aim: float = 0.0
+    unfinished: Minimum | None = None
+    root: float = 0.0
+    parts: int = 0
     n_minima: int = 0
     least: float | None = None
     stalls: int = 0
 
     def advance(self, landscape: Landscape, target: Target) -> Minimum | None:
         """Minimise once; return the minimum at u0, or an unjammed one if the energy vanishes on the way."""
+        begun, method = self._begun(landscape, target)
+        u = self.root**landscape.law.power
+        found = _relaxed(landscape, begun, replace(target, tolerance=self.tolerance), u, method)
+        self.parts += 1
+        if found.outcome is Outcome.UNJAMMED:
+            return self._compressed_or_lost(landscape, found, u)
+        self.unfinished, self.jammed = None, found
         if self.is_new:
-            self.jammed = _relaxed(landscape, self.jammed, target, self.jammed.energy_density)
             self.is_new, self.part, self.tries, self.n_minima = False, 1.0, 1, 0
             self.least, self.stalls = None, 0
-            self.tolerance, self.aim = target.tolerance, target.u0
-            lost = self.jammed if self.jammed.outcome is Outcome.UNJAMMED else None
+            self.aim = target.u0
         else:
-            lost = self._step(landscape, target)
-        if lost is not None:
-            return self.best or lost
+            self.n_minima += 1
+            self.part = min(2 * self.part, 1.0)
         return self._end(landscape, target) if self._is_there(target) else None
 
-    def _step(self, landscape: Landscape, target: Target) -> Minimum | None:
-        """Strain the box towards u0 and minimise; return the state if the packing is lost."""
-        root = _towards(landscape, self.jammed, self.aim, self.part)
-        strain = _strain_to(landscape, self.jammed, root)
-        wanted = replace(target, tolerance=self.tolerance)
-        strained = replace(self.jammed, state=followed(landscape, self.jammed, strain))
-        found = _relaxed(landscape, strained, wanted, root**landscape.law.power)
-        self.n_minima += 1
-        if found.outcome is not Outcome.UNJAMMED:
-            self.jammed, self.part = found, min(2 * self.part, 1.0)
-        elif self.tries == _TRIES:
-            return found
-        else:
-            self.tries, self.part = self.tries + 1, self.part / 4
+    def _begun(self, landscape: Landscape, target: Target) -> tuple[Minimum, str]:
+        """Return the state to minimise next, and the method."""
+        if self.unfinished is not None:
+            strain = _strain_to(landscape, self.unfinished, self.root)
+            return replace(self.unfinished, state=self.unfinished.state.strained(strain)), "auto"
+        self.parts = 0
+        if self.is_new:
+            self.tolerance = target.tolerance
+            self.root = landscape.law.root(self.jammed.energy_density)
+            return self.jammed, "near"
+        self.root = _towards(landscape, self.jammed, self.aim, self.part)
+        strain = _strain_to(landscape, self.jammed, self.root)
+        return replace(self.jammed, state=followed(landscape, self.jammed, strain)), "near"
+
+    def _compressed_or_lost(self, landscape: Landscape, found: Minimum, u: float) -> Minimum | None:
+        """Continue with a packing that slides; return one that fell apart, once fractions of the strain were tried."""
+        fallen = fraction_of_energy(landscape, _FALLEN) * u
+        slides = found.energy_density > fallen and self.parts < _MOST_PARTS
+        self.unfinished = found if slides else None
+        if slides:
+            return None
+        if self.is_new or self.tries == _TRIES:
+            return self.best or found
+        self.tries, self.part = self.tries + 1, self.part / 4
         return None
 
     def _is_there(self, target: Target) -> bool:
@@ -436,16 +459,17 @@ class Leading:
         return None
 
 
-def _relaxed(landscape: Landscape, at: Minimum, target: Target, u: float) -> Minimum:
+def _relaxed(landscape: Landscape, at: Minimum, target: Target, u: float, method: str) -> Minimum:
     """Minimise, to full tolerance only if u, the expected energy density, is nearly u0.
 
-    Before, a stalled state suffices: a search for a kink that fails takes longer than a step.
+    Before, a stalled state suffices: a search for a kink that fails takes longer than a step. There it is unjammed once
+    it slides.
     """
     near = abs(landscape.law.root(u / target.u0) - 1) < _NEAR
     tolerance = target.tolerance if near else max(target.tolerance, _GOOD_TO_MOVE)
-    lowest = fraction_of_energy(landscape, _FALLEN) * u
+    lowest = fraction_of_energy(landscape, _FALLEN if near else _SLID) * u
     stop = Stop(tolerance, lowest=lowest, kinks=near)
-    return minimise(landscape, at.state, "near", stop, at.history)
+    return minimise(landscape, at.state, method, stop, at.history)
 
 
 def nearer(landscape: Landscape, at: Minimum, u0: float) -> State:

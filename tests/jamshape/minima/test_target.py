@@ -10,6 +10,7 @@ from squeezed import quickly_squeezed
 from jamshape.contacts import coordination, find_contacts
 from jamshape.landscape import Landscape
 from jamshape.minima import History, Outcome, minimise, residual_of
+from jamshape.minima import target as target_of
 from jamshape.minima.checkpoints import search_of, told_search
 from jamshape.minima.target import (
     Leading,
@@ -184,6 +185,49 @@ def test_resumed_from_any_point_it_gives_the_same_bits(name):
             )
         assert search.minimum.evaluation.energy == whole.evaluation.energy
         assert search.minimum.outcome is whole.outcome
+
+
+@pytest.fixture
+def slides(monkeypatch):
+    """Energies on the way to u0, where nearly every packing counts as sliding."""
+    monkeypatch.setattr(target_of, "_SLID", 0.99)
+    energies = []
+
+    def seen(landscape, start, method, stop, *more):
+        u = landscape.evaluate(start).energy / start.volume
+        energies.append(0.99 * u / (stop.lowest or math.nan))
+        return minimise(landscape, start, method, stop, *more)
+
+    monkeypatch.setattr(target_of, "minimise", seen)
+    return energies
+
+
+def test_a_search_resumed_while_a_packing_slides_gives_the_same_bits(slides):
+    landscape, state = start_of("16 rods")
+    target = Target(1e-12)
+    points = [copied(s) for s in extrapolation(landscape, Search(state, target.step), target)]
+    whole = points.pop().minimum
+    within = [p for p in points if p.leading is not None and p.leading.unfinished is not None]
+    assert within
+    for search in (within[0], within[-1]):
+        for _ in extrapolation(Landscape(landscape.particles), search, target):
+            pass
+        np.testing.assert_array_equal(search.minimum.state.position, whole.state.position)
+        assert search.minimum.evaluation.energy == whole.evaluation.energy
+    assert whole.energy_density == pytest.approx(1e-12, rel=1e-7, abs=0)
+    assert whole.residual.largest <= 1e-8
+
+
+def test_a_packing_that_slides_is_compressed_to_the_energy_it_should_have(slides):
+    landscape, state = start_of("16 rods")
+    for search in extrapolation(landscape, Search(state, 5e-4), Target(1e-12)):
+        if search.leading is not None and search.leading.unfinished is not None:
+            before, slid = len(slides), search.leading.unfinished
+            search.leading.advance(landscape, Target(1e-12))
+            assert slid.outcome is Outcome.UNJAMMED
+            assert slides[before] == pytest.approx(1, abs=1e-3), slides[before]
+            return
+    pytest.fail("nothing slid")
 
 
 def test_search_yields_after_every_minimisation_and_has_its_minimum_in_the_end_only():
