@@ -47,8 +47,8 @@ _FALLEN = 1e-2
 # Likewise for this fraction of the energy that a compression step adds to a jammed packing.
 _UNJAMMED = 1e-3
 
-# A packing whose energy falls below this fraction of the expected one slides, and is compressed back to it, at most so many
-# times: at a fixed box the forces that drive the slide would fade, and with them its speed.
+# A packing whose energy falls below this fraction of the expected one slides. It is compressed back to that energy, at most
+# this many times: at a fixed box the forces that drive the slide would fade, and with them its speed.
 _SLID, _MOST_PARTS = 0.7, 100
 
 # Relative accuracy of the predicted displacements as the box is strained.

@@ -202,7 +202,8 @@ def slides(monkeypatch):
     return energies
 
 
-def test_a_search_resumed_while_a_packing_slides_gives_the_same_bits(slides):
+@pytest.mark.usefixtures("slides")
+def test_a_search_resumed_while_a_packing_slides_gives_the_same_bits():
     landscape, state = start_of("16 rods")
     target = Target(1e-12)
     points = [copied(s) for s in extrapolation(landscape, Search(state, target.step), target)]
