@@ -338,8 +338,8 @@ class Leading:
     """A minimum on its way to u0, between two minimisations, with all that is needed to resume it.
 
     The box is strained to where the root of u that is linear in the strain reaches that of u0. Where that opens the
-    packing, fractions of the strain are tried. One that slides is compressed meanwhile, at about equal energy. A
-    minimum that stalls at u0, where a contact is about to open or close, is approached again from a higher energy.
+    packing, fractions of the strain are tried. One that slides before it is near u0 is compressed meanwhile, at about equal
+    energy. A minimum that stalls at u0, where a contact is about to open or close, is approached again from a higher energy.
 
     Parameters
     ----------
@@ -358,7 +358,7 @@ class Leading:
     tolerance, aim
         Residual and energy density to reach.
     unfinished, root, parts
-        State of a packing that slides, if it does; the root of u at which it is held, and how often it was minimised there.
+        State of a packing that slides, if it does; the root of u expected, and how often it was minimised there.
     n_minima
         Minimisations of this approach.
     least, stalls

@@ -86,7 +86,7 @@ def test_steps_end_at_walls():
 @pytest.fixture(scope="module")
 def strict(tmp_path_factory):
     out = tmp_path_factory.mktemp("strict") / "packing.h5"
-    recipe = recipe_for(bidisperse(4.0), n=16, seed=2, strict=True)
+    recipe = recipe_for(bidisperse(4.0), n=16, seed=8, strict=True)
     make(recipe, out)
     return out, recipe
 
