@@ -3,6 +3,7 @@
 #include "contact/shapes.hpp"
 
 #include "bindings/shape.hpp"
+#include "landscape/vicinity.hpp"
 
 #include <memory>
 #include <nanobind/stl/shared_ptr.h>

@@ -4,42 +4,22 @@
 #include "contact/math/vec.hpp"
 #include "contact/pair_derivatives.hpp"
 
+#include "landscape/coordinates.hpp"
 #include "packing/pair_sum.hpp"
 #include "packing/split.hpp"
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <utility>
 #include <vector>
 
 namespace jamshape {
 
-/// Poses of N particles and the box, in double-double: [0] the doubles, [1] the low parts.
-struct Poses {
-  using Numbers = std::vector<double>[2];
-  Numbers position;     // (N, D)
-  Numbers orientation;  // (N,) angles in the plane, (N, 4) quaternions in space
-  Numbers cell;         // (D, D) cell vectors as columns, upper triangular
-
-  static Split get(const Numbers &of, std::size_t k) { return {of[0][k], of[1][k]}; }
-  static void set(Numbers &of, std::size_t k, const Split &to)
-  {
-    of[0][k] = to.value;
-    of[1][k] = to.rest;
-  }
-
-  /// A view to be strained.
-  SplitPoses view(double strain) const
-  {
-    const auto parts = [](const Numbers &of) { return std::array{of[0].data(), of[1].data()}; };
-    return {parts(position), parts(orientation), parts(cell), strain};
-  }
-};
-
 /// Pairs whose surfaces were closer than `skin` at some poses, and centres closer than `reach`.
-struct NearPairs {
+template <int D> struct NearPairs {
   std::vector<std::int64_t> particles, shift;  // (M, 2), (M, D)
   Poses then;
   double skin, reach;
@@ -48,6 +28,130 @@ struct NearPairs {
   std::vector<double> strain{}, moved{}, turned{};
 
   PairList list() const { return {particles.size() / 2, particles.data(), shift.data()}; }
+
+  /// Measures what moved since then.
+  void measure(const BasePoses<D> &near)
+  {
+    moved.resize(D * near.n_particles());
+    turned.resize(TURN_NUMBERS<D> * near.n_particles());
+    strain = strain_to(near.base);
+    const Poses &base = near.base;
+    double *const moved_by = moved.data();
+    for (std::size_t c = 0; c < moved.size(); ++c) {
+      const Split change = since(base.position, then.position, c);
+      moved_by[c] = change.value + change.rest;
+    }
+    const auto is_zero = [](double x) { return x == 0.0; };
+    if (!std::all_of(strain.begin(), strain.end(), is_zero)) subtract_strain(base);
+    for (std::size_t i = 0; i < near.n_particles(); ++i) {
+      if (near.turns(i)) measure_turn(base, i);
+    }
+  }
+
+  /// Displacement of a particle at a point, apart from the box's strain.
+  Vec<D> shift_to(const BasePoses<D> &near, const Displacement &at, std::size_t i) const
+  {
+    Vec<D> by = near.shift(at, i);
+    for (int k = 0; k < D; ++k) by[k] += moved[D * i + k];
+    return by;
+  }
+
+  /// Whether the gap of two surfaces may have shrunk by the skin, or by its remainder.
+  bool is_beyond(const BasePoses<D> &near, const Displacement &at, double kept = 0.0) const
+  {
+    double most = 0.0, most_sq = 0.0;
+    const double stretch = 1.0 + at.strain;
+    for (std::size_t i = 0; i < near.n_particles(); ++i) {
+      const Vec<D> by = shift_to(near, at, i);
+      if (near.turns(i)) {
+        const double rotated = near.coordinates.turning_radius[i] * turned_to(near, at, i);
+        most = std::max(most, stretch * norm(by) + rotated);
+      } else {
+        most_sq = std::max(most_sq, norm_sq(by));
+      }
+    }
+    most = std::max(most, stretch * std::sqrt(most_sq));
+    return 2.0 * most >= skin - kept - box_strain(stretch) * reach;
+  }
+
+ private:
+  /// Change of a number.
+  static Split since(const Poses::Numbers &now, const Poses::Numbers &then, std::size_t k)
+  {
+    return difference(Poses::get(now, k), Poses::get(then, k));
+  }
+
+  /// Strain of the box: the map from its cell vectors then to those now, upper triangular like
+  /// both, minus the identity.
+  std::vector<double> strain_to(const Poses &base) const
+  {
+    const std::vector<double> &before = then.cell[0];
+    std::vector<double> found(D * D);
+    for (int k = 0; k < D; ++k) {
+      for (int m = k; m < D; ++m) {
+        double left = rounded(joined(since(base.cell, then.cell, D * k + m)));
+        for (int l = k; l < m; ++l) left -= found[D * k + l] * before[D * l + m];
+        found[D * k + m] = left / before[D * m + m];
+      }
+    }
+    return found;
+  }
+
+  /// Subtracts the displacements with the box, in long doubles: they grow with its size.
+  void subtract_strain(const Poses &base)
+  {
+    for (std::size_t c = 0; c < moved.size(); ++c) {
+      const std::size_t k = c % D;
+      long double own = joined(since(base.position, then.position, c));
+      for (std::size_t m = k; m < D; ++m) {
+        own -= strain[D * k + m] * joined(Poses::get(then.position, c - k + m));
+      }
+      moved[c] = rounded(own);
+    }
+  }
+
+  void measure_turn(const Poses &base, std::size_t i)
+  {
+    constexpr int TURNS = TURN_NUMBERS<D>;
+    const double *const now = &base.orientation[0][TURNS * i];
+    const double *const before = &then.orientation[0][TURNS * i];
+    if constexpr (D == 2) {
+      turned[i] = now[0] - before[0];
+    } else {
+      const Quaternion q = Quaternion{now[0], now[1], now[2], now[3]} *
+                           Quaternion{before[0], -before[1], -before[2], -before[3]};
+      const double parts[] = {q.w, q.i, q.j, q.k};
+      std::copy_n(parts, TURNS, &turned[TURNS * i]);
+    }
+  }
+
+  /// An upper bound of the rotation angle of a particle at a point.
+  double turned_to(const BasePoses<D> &near, const Displacement &at, std::size_t i) const
+  {
+    const double *const before = &turned[TURN_NUMBERS<D> * i];
+    if constexpr (D == 2) {
+      const double angle = std::abs(before[0] + near.turn(at, i)[0]);
+      return angle > M_PI ? std::abs(std::remainder(angle, 2.0 * M_PI)) : angle;
+    } else {
+      const Quaternion q =
+          rotation_by(near.turn(at, i)) * Quaternion{before[0], before[1], before[2], before[3]};
+      return std::min(M_PI, 2.0 * norm(Vec<3>{{q.i, q.j, q.k}}) / std::abs(q.w));  // its tangent
+    }
+  }
+
+  /// Bound of the relative change of a vector by the box's strain and then by a stretch.
+  double box_strain(double stretch) const
+  {
+    double scaled = 0.0, sheared_sq = 0.0;
+    for (int k = 0; k < D; ++k) {
+      scaled = std::max(scaled, std::abs(stretch * (1.0 + strain[(D + 1) * k]) - 1.0));
+      for (int m = k + 1; m < D; ++m) {
+        const double sheared = stretch * strain[D * k + m];
+        sheared_sq += sheared * sheared;
+      }
+    }
+    return scaled + std::sqrt(sheared_sq);
+  }
 };
 
 /// Pairs of a list near the poses at which it was made, in doubles. A separation is the one at that
@@ -62,7 +166,7 @@ template <class Model, int D> class MovedPairs : public BodyPairs<Model, D, doub
   using InLong = PosedPair<Model, D, long double>;
 
   /// `exact(p)` returns a pair at the present poses in long doubles.
-  MovedPairs(const std::vector<Shape> &particle_shapes, const NearPairs &list,
+  MovedPairs(const std::vector<Shape> &particle_shapes, const NearPairs<D> &list,
              const Laws<typename Model::Law> &contact_laws,
              std::function<InLong(std::size_t)> exact_pair) :
       Base(particle_shapes, list.list(), contact_laws), exact(std::move(exact_pair)),
