@@ -18,17 +18,14 @@ each row of Ellipsoids.
 
 from __future__ import annotations
 
-import contextlib
 import io
-import itertools
 import os
-import re
 import warnings
 import weakref
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple, TextIO
+from typing import Any, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,76 +34,34 @@ from jamshape.arrays import FloatArray, IntArray
 from jamshape.files.dump_index import index_of
 from jamshape.files.frames import row_of
 from jamshape.files.h5md import FileFormatError, PathLike, read_packing, replacing
-from jamshape.files.meaning import (
-    PLANE,
-    Geometry,
-    Said,
-    Wanted,
-    meaning_of,
-    most_digits,
-    require_told,
+from jamshape.files.lammps_columns import (
+    BLOCK_COMMENT,
+    BLOCKS,
+    DIAMETERS,
+    EXPONENT,
+    EXPONENT_COMMENT,
+    FORM_COMMENT,
+    IMAGE,
+    POSITION,
+    PROPERTIES,
+    QUATERNION,
+    ROUNDNESS,
+    TITLE,
+    Frame,
+    whole,
 )
+from jamshape.files.lammps_data_text import data_frame, law_of_settings, said_by_pairs
+from jamshape.files.lammps_dump_text import dump_frame
+from jamshape.files.meaning import PLANE, Geometry, Said, Wanted, meaning_of, require_told
 from jamshape.files.signature import DUMP, GSD, HDF5, REFUSED, format_of
 from jamshape.files.unpacked import opened_plain
-from jamshape.packing import Box, Lengths, Packing, angle_from_quaternion, cuboid_around
-from jamshape.packing.columns import flat, joined
-from jamshape.shapes.shape import Stiffness, power_of, stiffness_of, stiffness_text, stiffness_told
+from jamshape.packing import Box, Packing, angle_from_quaternion
+from jamshape.packing.columns import flat
+from jamshape.shapes.shape import stiffness_text
 from jamshape.shapes.table import SHAPES, shape_named
 
-_TITLE = "LAMMPS data file by jamshape"
-_EXPONENT_COMMENT, _BLOCK_COMMENT, _FORM_COMMENT = "exponent=", "block=", "form="
-_FORM = "# form "  # and its number, a colon and numbers, in one line or several
 _NUMBERS_IN_LINE = 8
-_POSITION = ("x", "y", "z")
-# Positions in dumps: wrapped or not, and in units of the box.
-_POSITIONS = (_POSITION, ("xu", "yu", "zu"), ("xs", "ys", "zs"), ("xsu", "ysu", "zsu"))
-_IMAGE = ("ix", "iy", "iz")
-_QUATERNION = ("quatw", "quati", "quatj", "quatk")
-_DIAMETERS = ("shapex", "shapey", "shapez")
-_EXPONENT = ("exponent",)
-_ROUNDNESS = ("SuperquadricRoundness.Phi", "SuperquadricRoundness.Theta")  # OVITO's names
-_WIDTHS = {"diameter": 1.0, "radius": 2.0}  # of discs, over their diameter
-_PROPERTIES = (*_QUATERNION, *_DIAMETERS)  # in the order of a compute property/atom of seven
-# Names of computes of several columns, with the columns.
-_COMPUTES = {
-    **dict.fromkeys(("q", "quat", "quaternion", "orient", "orientation", "body"), _PROPERTIES),
-    **dict.fromkeys(("shape", "diameter", "diameters"), _DIAMETERS),
-}
-_DUMP_COLUMNS = ("id", "type", *_POSITION, *_QUATERNION, *_DIAMETERS)
-_ATOMS = ("id", "type", "ellipsoidflag", "density", *_POSITION)
-_SPHERES = ("id", "type", "diameter", "density", *_POSITION)
-_ELLIPSOIDS = ("id", *_DIAMETERS, *_QUATERNION)
-_BLOCKS = ("block1", "block2")  # n1 and n2 of atom_style ellipsoid superellipsoid
-_ATOM_STYLE = "ellipsoid"
-# Columns behind those of ellipsoids, by other styles in an atom style hybrid.
-_HYBRID = {
-    "atomic": (),
-    **dict.fromkeys(("molecular", "bond", "angle"), ("mol",)),
-    "charge": ("q",),
-    "full": ("mol", "q"),
-}
-_ATOMS_OF_HYBRID = ("id", "type", "x", "y", "z", "ellipsoidflag", "density")
-_PAIRS = {"Pair Coeffs": 1, "PairIJ Coeffs": 2}  # types in a row
-_BOUNDARY = re.compile(r"(xy xz yz )?(pp|[fsm]{2})( (pp|[fsm]{2})){2}")
 _ALIKE = 1e-9  # relative difference of exponents that rounding leaves
-_COUNTED = 200  # rows from which the number of digits is determined
-# TIMESTEP precedes TIME, which is its prefix.
-_ITEM_ROWS = {"UNITS": 1, "TIMESTEP": 1, "TIME": 1, "NUMBER OF ATOMS": 1, "BOX BOUNDS": 3}
-
-
-class _Frame(NamedTuple):
-    columns: Mapping[str, FloatArray]
-    """Columns by their names in a dump, each (N,), in the order of the ids."""
-    bounds: FloatArray
-    """(3, 2) lower and upper ends."""
-    tilt: FloatArray
-    """(3,) xy, xz, yz."""
-    said: Said = Said()
-    step: int = 0
-    time: float = 0.0
-    others: Mapping[str, NDArray[Any]] = {}
-    """Columns that are only kept."""
-    boundary: str = "pp pp pp"
 
 
 def write_data(
@@ -148,15 +103,15 @@ def write_data(
         np.savetxt(file, atoms, fmt=["%d"] * 3 + ["%.17g"] * 4 + ["%d"] * 3)
         file.write("\nEllipsoids\n\n")
         row = ["%d"] + ["%.17g"] * 7
-        has_both = packing.shape.has_exponent and packing.form.shape[1] == len(_BLOCKS)
+        has_both = packing.shape.has_exponent and packing.form.shape[1] == len(BLOCKS)
         if blocks or has_both:
-            row += ["%.17g" if blocks else f"# {_BLOCK_COMMENT}%.17g", "%.17g"]
+            row += ["%.17g" if blocks else f"# {BLOCK_COMMENT}%.17g", "%.17g"]
             ellipsoids = np.column_stack([ellipsoids, _both_exponents(packing)])
         elif packing.shape.has_exponent:
-            row += [f"# {_EXPONENT_COMMENT}%.17g"]
+            row += [f"# {EXPONENT_COMMENT}%.17g"]
             ellipsoids = np.column_stack([ellipsoids, packing.exponent])
         if packing.shape.has_form:
-            row += [f"# {_FORM_COMMENT}%d"]
+            row += [f"# {FORM_COMMENT}%d"]
             ellipsoids = np.column_stack([ellipsoids, 1 + _forms(packing)[1]])
         np.savetxt(file, ellipsoids, fmt=row)
 
@@ -184,8 +139,8 @@ def write_dump(path: PathLike, packings: Packing | Iterable[Packing]) -> None:
 def _both_exponents(packing: Packing) -> FloatArray:
     """Return n1 and n2 (N, 2), those of an ellipsoid if the shape has none."""
     if packing.shape.has_exponent:
-        return packing.shape.widened(packing.form, len(_BLOCKS))
-    return np.full((packing.n, len(_BLOCKS)), 2.0)
+        return packing.shape.widened(packing.form, len(BLOCKS))
+    return np.full((packing.n, len(BLOCKS)), 2.0)
 
 
 def _forms(packing: Packing) -> tuple[FloatArray, IntArray]:
@@ -211,14 +166,14 @@ def _write_frame(file: TextIO, packing: Packing) -> None:
         bounds = np.column_stack([bounds, [*packing.box.tilt.tolist(), 0.0, 0.0][:3]])
         boundary = f"xy xz yz {boundary}"
     columns: dict[str, NDArray[Any]] = {"id": packing.id, "type": packing.species}
-    columns |= dict(zip(_POSITION, _padded(packing.position).T, strict=True))
-    columns |= dict(zip(_IMAGE, _padded(packing.image).astype(np.int64).T, strict=True))
-    columns |= dict(zip(_PROPERTIES, [*packing.quaternions.T, *packing.diameters.T], strict=True))
-    if packing.shape.has_exponent and packing.form.shape[1] == len(_BLOCKS):
-        columns |= dict(zip(_BLOCKS, packing.form.T, strict=True))
-        columns |= dict(zip(_ROUNDNESS, 2 / packing.form.T, strict=True))
+    columns |= dict(zip(POSITION, _padded(packing.position).T, strict=True))
+    columns |= dict(zip(IMAGE, _padded(packing.image).astype(np.int64).T, strict=True))
+    columns |= dict(zip(PROPERTIES, [*packing.quaternions.T, *packing.diameters.T], strict=True))
+    if packing.shape.has_exponent and packing.form.shape[1] == len(BLOCKS):
+        columns |= dict(zip(BLOCKS, packing.form.T, strict=True))
+        columns |= dict(zip(ROUNDNESS, 2 / packing.form.T, strict=True))
     elif packing.shape.has_exponent:
-        columns |= {"exponent": packing.exponent, **dict.fromkeys(_ROUNDNESS, 1 / packing.exponent)}
+        columns |= {"exponent": packing.exponent, **dict.fromkeys(ROUNDNESS, 1 / packing.exponent)}
     if packing.shape.has_form:
         columns |= flat({"form": packing.form})
     columns = flat(packing.columns) | columns
@@ -234,7 +189,7 @@ def _write_frame(file: TextIO, packing: Packing) -> None:
 
 
 def _place_in_row(name: str) -> int:
-    known = ("id", "type", *_POSITION, *_IMAGE, *_PROPERTIES, *_EXPONENT, *_BLOCKS, *_ROUNDNESS)
+    known = ("id", "type", *POSITION, *IMAGE, *PROPERTIES, *EXPONENT, *BLOCKS, *ROUNDNESS)
     return known.index(name) if name in known else len(known)
 
 
@@ -267,7 +222,7 @@ def read_data(path: PathLike, dimension: int | None = None, shape: str | None = 
     with opened_plain(path) as file:
         text = file.read().decode(errors="replace").replace("\r\n", "\n")
     try:
-        return _packing(path, _data_frame(text), Wanted(dimension, shape))
+        return _packing(path, data_frame(text), Wanted(dimension, shape))
     except ValueError as error:
         msg = f"{path}: {error}"
         raise FileFormatError(msg) from error
@@ -333,7 +288,7 @@ class DumpFile:
         text = io.BytesIO(os.pread(self._file.fileno(), end - start, start))
         lines = io.TextIOWrapper(text, encoding="utf-8", errors="replace")
         try:
-            read = _dump_frame(lines, is_first=not self._is_told)
+            read = dump_frame(lines, is_first=not self._is_told)
             packing = _packing(self.path, read, self._wanted)
         except ValueError as error:
             msg = f"{self.path}: frame {frame}: {error}"
@@ -404,7 +359,7 @@ def _header_text(packing: Packing) -> str:
         sides.append(" ".join(f"{x:.17g}" for x in tilt) + " xy xz yz")
     told = {"shape": packing.shape_style, "dimension": packing.dimension, **packing.law.stated()}
     told["k_e"] = stiffness_text(packing.law.k_e)
-    title = f"{_TITLE} # " + " ".join(f"{name}={value}" for name, value in told.items())
+    title = f"{TITLE} # " + " ".join(f"{name}={value}" for name, value in told.items())
     return "\n".join([title, "", *counts, "", *sides, ""])
 
 
@@ -420,7 +375,7 @@ def _pairs_text(packing: Packing) -> str:
     return "\n".join([f"\nPairIJ Coeffs # {name[0]}", "", *rows.values(), ""])
 
 
-def _packing(path: PathLike, frame: _Frame, wanted: Wanted) -> Packing:
+def _packing(path: PathLike, frame: Frame, wanted: Wanted) -> Packing:
     def stack(names: Sequence[str]) -> FloatArray:
         return np.column_stack([frame.columns[name] for name in names])
 
@@ -429,20 +384,20 @@ def _packing(path: PathLike, frame: _Frame, wanted: Wanted) -> Packing:
     if told and not shape_named(told).has_exponent and (exponent == 1).all():
         exponent = np.empty(0)  # those of the ellipsoids in which LAMMPS holds any shape
     form = others.pop("form", frame.columns.get("form", np.empty((0, 0))))
-    quaternion = stack(_QUATERNION)
-    there = Geometry(stack(_POSITION), quaternion, stack(_DIAMETERS), frame.bounds, frame.tilt)
+    quaternion = stack(QUATERNION)
+    there = Geometry(stack(POSITION), quaternion, stack(DIAMETERS), frame.bounds, frame.tilt)
     said = replace(frame.said, has_exponent=len(exponent) > 0, form=form)
     dimension, shape, law = meaning = meaning_of(path, there, said, wanted)
     quaternion = meaning.turned(quaternion)
     lo, hi = frame.bounds[:dimension].T
-    has_image = set(_IMAGE) <= set(frame.columns)
+    has_image = set(IMAGE) <= set(frame.columns)
     packing = Packing(
         position=there.position[:, :dimension],
         orientation=angle_from_quaternion(quaternion) if dimension == 2 else quaternion,
         diameters=shape.diameters,
-        species=_whole(frame.columns["type"]),
-        id=_whole(frame.columns["id"]),
-        image=_whole(stack(_IMAGE[:dimension])) if has_image else np.empty((0, 0), np.int64),
+        species=whole(frame.columns["type"]),
+        id=whole(frame.columns["id"]),
+        image=whole(stack(IMAGE[:dimension])) if has_image else np.empty((0, 0), np.int64),
         box=Box(lo=lo, edges=hi - lo, tilt=frame.tilt[: 1 if dimension == 2 else 3]),
         shape_style=shape.name,
         form=SHAPES[shape.name].form_of_exponents(exponent) if len(exponent) else form,
@@ -485,13 +440,13 @@ def packing_of_columns(
     style, *rows = pair.splitlines() or [""]
     shape = style.partition("/")[0]
     if shape in SHAPES:
-        said = _of_pairs(shape, [row.split() for row in rows], 2, columns)
-        said = replace(said, law={**said.law, **_of_settings(style)})
+        said = said_by_pairs(shape, [row.split() for row in rows], 2, columns)
+        said = replace(said, law={**said.law, **law_of_settings(style)})
     (bounds, tilt), boundary = box
-    return _packing(name, _Frame(columns, bounds, tilt, said, boundary=boundary), wanted)
+    return _packing(name, Frame(columns, bounds, tilt, said, boundary=boundary), wanted)
 
 
-def _require_closed(path: PathLike, packing: Packing, frame: _Frame) -> None:
+def _require_closed(path: PathLike, packing: Packing, frame: Frame) -> None:
     """Refuse open boundaries that a particle could reach across; a periodic box has the same contacts otherwise."""
     ends = frame.boundary.split()[-3:][: packing.dimension]
     is_open = np.array([end != "pp" for end in ends])
@@ -516,9 +471,9 @@ def _require_closed(path: PathLike, packing: Packing, frame: _Frame) -> None:
 
 def _exponent(columns: Mapping[str, FloatArray]) -> FloatArray:
     """(N,) exponents p, or (N, 2) n1 and n2 if these differ; empty if the file has none."""
-    if set(_EXPONENT) <= set(columns):
+    if set(EXPONENT) <= set(columns):
         return columns["exponent"]
-    for names, power in ((_BLOCKS, 1), (_ROUNDNESS, -1)):
+    for names, power in ((BLOCKS, 1), (ROUNDNESS, -1)):
         if not set(names) <= set(columns):
             continue
         both = np.column_stack([columns[name] for name in names])
@@ -531,426 +486,3 @@ def _exponent(columns: Mapping[str, FloatArray]) -> FloatArray:
             return np.asarray(one / 2 if power > 0 else 1 / one)
         return both if power > 0 else 2 / both
     return np.empty(0)
-
-
-def _whole(column: FloatArray) -> IntArray:
-    if not (column == np.floor(column)).all():
-        msg = "a column of integers holds other numbers, expected whole id, type and image"
-        raise ValueError(msg)
-    return column.astype(np.int64)
-
-
-def _columns(
-    rows: Sequence[str], names: Sequence[str], wanted: Sequence[str]
-) -> dict[str, FloatArray]:
-    """Parse rows with column names; return the wanted columns in the order of the ids."""
-    words = [row.split() for row in rows]
-    for row in words:
-        if len(row) != len(names):
-            msg = f"row {' '.join(row)!r} has {len(row)} columns, expected {' '.join(names)!r}"
-            raise ValueError(msg)
-    picked = [names.index(name) for name in wanted]
-    table = np.array([[row[i] for i in picked] for row in words], dtype=np.float64)
-    table = table.reshape(len(rows), len(wanted))
-    return dict(zip(wanted, table[table[:, wanted.index("id")].argsort()].T, strict=True))
-
-
-def _data_frame(text: str) -> _Frame:
-    if not text:
-        msg = "the file is empty, expected a LAMMPS data file"
-        raise ValueError(msg)
-    if not text.endswith("\n"):
-        msg = "the file ends within a line, expected a complete data file"
-        raise ValueError(msg)
-    sections = _sections(text)
-    header = _header(sections[""].rows)
-    if "atoms" not in header:
-        msg = "the header has no line 'N atoms', expected a LAMMPS data file"
-        raise ValueError(msg)
-    n = int(header["atoms"][0])
-    atom_rows = _numbered(_section(sections, "Atoms", n), sections.get("Atom Type Labels"))
-    names = _atom_columns(sections["Atoms"].title, len(atom_rows[0].split()))
-    columns = _columns(atom_rows, names, names)
-    if "diameter" in columns:
-        columns |= _round(columns)
-    else:
-        _require_ellipsoids(columns)
-        rows = _section(sections, "Ellipsoids", n)
-        ellipsoids = _ellipsoids(rows, sections["Ellipsoids"].comments)
-        if not np.array_equal(columns["id"], ellipsoids["id"]):
-            msg = "Atoms and Ellipsoids hold different ids, expected one ellipsoid for each atom"
-            raise ValueError(msg)
-        columns |= ellipsoids
-    said = replace(_said(text, sections, columns), digits=_digits(atom_rows, names))
-    others: dict[str, NDArray[Any]] = {"q": columns["q"]} if "q" in columns else {}
-    others |= _form(text, columns)
-    others |= {"mol": _whole(columns["mol"])} if "mol" in columns else {}
-    return _Frame(columns, *_bounds(header), said, others=others)
-
-
-def _round(columns: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Return diameters and quaternions of discs from a column of their widths."""
-    name = next(name for name in _WIDTHS if name in columns)
-    width = _WIDTHS[name] * columns[name]
-    if not (width > 0).all():
-        msg = f"{name} holds {columns[name].min():g}, expected particles of positive widths, no points"
-        raise ValueError(msg)
-    zero = np.zeros(len(width))
-    quaternion = zip(_QUATERNION, (zero + 1, zero, zero, zero), strict=True)
-    return dict.fromkeys(_DIAMETERS, width) | dict(quaternion)
-
-
-class _Section(NamedTuple):
-    """Rows of a data file under a title."""
-
-    title: str
-    """Comment behind it, such as the atom style."""
-    rows: list[str]
-    """Rows without comments and blank lines."""
-    comments: list[str]
-    """Comments behind the rows."""
-
-
-def _sections(text: str) -> dict[str, _Section]:
-    """Return rows by the title of their section, '' for the header."""
-    sections = {"": _Section("", [], [])}
-    here = sections[""]
-    for line in text.splitlines()[1:]:
-        content, _, comment = (part.strip() for part in line.partition("#"))
-        if content[:1].isalpha():
-            here = sections.setdefault(content, _Section(comment, [], []))
-        elif content:
-            here.rows.append(content)
-            here.comments.append(comment)
-    return sections
-
-
-def _numbered(rows: list[str], labels: _Section | None) -> list[str]:
-    """Replace type labels by numbers, if the file has labels."""
-    if labels is None:
-        return rows
-    numbers = {words[1]: words[0] for words in (row.split() for row in labels.rows)}
-    words = [row.split() for row in rows]
-    return [" ".join([id_, numbers.get(label, label), *rest]) for id_, label, *rest in words]
-
-
-def _atom_columns(title: str, count: int) -> tuple[str, ...]:
-    """Name the columns of Atoms by the atom style in its title."""
-    style, *others = title.split() or [_ATOM_STYLE]
-    if style in {_ATOM_STYLE, "sphere"}:
-        names = _ATOMS if style == _ATOM_STYLE else _SPHERES
-        return names if count == len(names) else (*names, *_IMAGE)
-    what = "expected atoms of style ellipsoid or sphere; write the file from LAMMPS with atom_style ellipsoid"
-    if style != "hybrid":
-        msg = f"the section is titled 'Atoms # {title}', {what}"
-        raise ValueError(msg)
-    known = others[:1] == [_ATOM_STYLE] and set(others[1:]) <= set(_HYBRID)
-    more = [column for name in others[1:] for column in _HYBRID[name]] if known else []
-    plain = (*_ATOMS_OF_HYBRID, *more)
-    if not known or count not in {len(plain), len(plain) + len(_IMAGE)}:
-        msg = (
-            f"the section is titled 'Atoms # {title}', which does not define its {count} columns, {what}, or"
-            " name the styles of the hybrid in the title, ellipsoid first, such as"
-            " 'Atoms # hybrid ellipsoid molecular'"
-        )
-        raise ValueError(msg)
-    return plain if count == len(plain) else (*plain, *_IMAGE)
-
-
-def _require_ellipsoids(atoms: Mapping[str, FloatArray]) -> None:
-    """Refuse columns of another atom style, and atoms that are not ellipsoids."""
-    if not ((atoms["ellipsoidflag"] == 1) & (atoms["density"] > 0)).all():
-        msg = (
-            "columns of Atoms are not those of atom_style ellipsoid, expected 1 as ellipsoidflag and a"
-            " positive density in each row; name the atom style in the title, such as 'Atoms # ellipsoid'"
-        )
-        raise ValueError(msg)
-
-
-def _ellipsoids(rows: Sequence[str], comments: Sequence[str]) -> dict[str, FloatArray]:
-    """Read the section Ellipsoids, with exponents and forms if present."""
-    has_blocks = len(rows[0].split()) == len(_ELLIPSOIDS) + len(_BLOCKS)
-    names = (*_ELLIPSOIDS, *_BLOCKS) if has_blocks else _ELLIPSOIDS
-    ours = {_EXPONENT_COMMENT: _EXPONENT, _BLOCK_COMMENT: _BLOCKS, _FORM_COMMENT: ("form",)}
-    for beginning, more in ours.items():
-        if all(comment.startswith(beginning) for comment in comments):
-            told = [comment.removeprefix(beginning) for comment in comments]
-            rows, names = [f"{a} {b}" for a, b in zip(rows, told, strict=True)], (*names, *more)
-    return _columns(rows, names, names)
-
-
-def _form(text: str, columns: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Return the forms (N, K) of particles, if the file has them: from comments of ours, or coefficients of types."""
-    forms: dict[int, list[float]] = {}
-    for line in text.splitlines() if "form" in columns else ():
-        if line.startswith(_FORM):
-            number, _, words = line.removeprefix(_FORM).partition(":")
-            forms.setdefault(int(number), []).extend(map(float, words.split()))
-    return _form_rows(forms, columns["form"]) if forms else {}
-
-
-def _form_rows(forms: Mapping[int, Sequence[float]], of: FloatArray) -> dict[str, FloatArray]:
-    """Return forms (N, K) by their numbers (N,), shorter ones with zeros behind."""
-    unknown = set(of.tolist()) - forms.keys()
-    if unknown:
-        msg = f"a particle has form {min(unknown):g}, expected one of the {len(forms)} forms that the file lists"
-        raise ValueError(msg)
-    width = max(map(len, forms.values()))
-    rows = {number: [*row, *[0.0] * (width - len(row))] for number, row in forms.items()}
-    return {"form": np.array([rows[int(number)] for number in of])}
-
-
-def _said(text: str, sections: Mapping[str, _Section], columns: dict[str, FloatArray]) -> Said:
-    """Collect the metadata of a data file; exponents of types go to the columns."""
-    first = text.partition("\n")[0]
-    if first.startswith(_TITLE) and "#" in first:
-        words = dict(word.split("=", 1) for word in first.split("#")[1].split() if "=" in word)
-        law: dict[str, Any] = {k: float(words[k]) for k in ("sides", "power") if k in words}
-        law |= {"k_e": stiffness_told(words["k_e"])} if "k_e" in words else {}
-        rows = sections["PairIJ Coeffs"].rows if "PairIJ Coeffs" in sections else []
-        if not all(_is_of(law.get("k_e", 1.0), row.split()) for row in rows):
-            msg = "PairIJ Coeffs differ from k_e in the first line, expected both to agree; change both"
-            raise ValueError(msg)
-        dimension = int(words["dimension"]) if "dimension" in words else None
-        return Said(dimension, words.get("shape", ""), law, is_ours=True)
-    for name, n_types in _PAIRS.items():
-        shape = sections[name].title.partition("/")[0] if name in sections else ""
-        if shape in SHAPES:
-            return _of_pairs(shape, [row.split() for row in sections[name].rows], n_types, columns)
-    return Said()
-
-
-def _of_pairs(
-    shape: str, rows: Sequence[Sequence[str]], n_types: int, columns: dict[str, FloatArray]
-) -> Said:
-    """Read the coefficients of our pair styles, as LAMMPS's `write_data` writes them."""
-    k_e = _stiffness(rows, n_types)
-    own = {int(row[0]): row for row in rows if len(set(row[:n_types])) == 1}
-    if SHAPES[shape].has_exponent and not {*_EXPONENT, *_BLOCKS} & set(columns):
-        usual = np.ones((1, 1))
-        told = {kind: np.array([row[n_types + 1 :]], np.float64) for kind, row in own.items()}
-        known = {kind: form if form.size else usual for kind, form in told.items()}
-        width = max((form.shape[1] for form in known.values()), default=1)
-        wide = [
-            SHAPES[shape].widened(known.get(int(kind), usual), width)[0] for kind in columns["type"]
-        ]
-        columns |= dict(zip(_EXPONENT if width == 1 else _BLOCKS, np.array(wide).T, strict=True))
-    if SHAPES[shape].has_form:
-        forms = {kind: [float(x) for x in row[n_types + 1 :]] for kind, row in own.items()}
-        columns |= _form_rows(forms, columns["type"])
-    return Said(shape=shape, law={"k_e": k_e})
-
-
-def _of_settings(style: str) -> dict[str, Any]:
-    """Read the constants of contacts among the settings of a pair style of ours, ``sides one law power 3``."""
-    own, _, law = style.partition(" law ")
-    sides = {"sides": 1 if own.endswith("sides one") else 2}
-    return sides | ({"power": power_of(law)} if law else {})
-
-
-def _is_of(k_e: Stiffness, row: Sequence[str]) -> bool:
-    """Return whether a row I J k_e agrees with known stiffnesses."""
-    i, j = (int(kind) - 1 for kind in row[:2])
-    if not isinstance(k_e, tuple):
-        return float(row[2]) == k_e
-    return max(i, j) < len(k_e) and float(row[2]) == k_e[i][j]
-
-
-def _stiffness(rows: Sequence[Sequence[str]], n_types: int) -> Stiffness:
-    """Return k_e from the rows of Pair Coeffs, which LAMMPS mixes for unlike types, or PairIJ Coeffs."""
-    found = {tuple(map(int, row[:n_types])): float(row[n_types]) for row in rows}
-    types = range(1, max(map(max, found), default=0) + 1)
-    pairs = [(i, j) if n_types == 2 else (i,) for i in types for j in types[i - 1 :]]
-    if not found or set(pairs) != set(found):
-        msg = f"pair coefficients have {len(found)} rows for {len(types)} types, expected {len(set(pairs)) or 'some'}"
-        raise ValueError(msg)
-    if len(set(found.values())) == 1:
-        return next(iter(found.values()))
-    if n_types == 1:
-        said = (
-            "Pair Coeffs state k_e of equal types only: that of unlike ones is the geometric mean, as LAMMPS reads it; write"
-            " the file with 'write_data FILE pair ij' to keep others"
-        )
-        warnings.warn(said, stacklevel=2)
-        own = np.array([found[(i,)] for i in types])
-        table = np.sqrt(np.multiply.outer(own, own))
-        np.fill_diagonal(table, own)
-        return stiffness_of(table)
-    return stiffness_of([[found[min(i, j), max(i, j)] for j in types] for i in types])
-
-
-def _digits(rows: Sequence[str], names: Sequence[str], place: Sequence[str] = _POSITION) -> int:
-    """Count the digits of coordinates in the first rows."""
-    places = [names.index(name) for name in place]
-    return most_digits([row.split()[k] for row in rows[:_COUNTED] for k in places])
-
-
-def _header(lines: Sequence[str]) -> dict[str, list[str]]:
-    """Return numbers by the keyword that follows them on their line."""
-    header = {}
-    for line in lines:
-        words = line.split()
-        numbers = list(itertools.takewhile(lambda word: not word[0].isalpha(), words))
-        header[" ".join(words[len(numbers) :])] = numbers
-    return header
-
-
-def _section(sections: Mapping[str, _Section], name: str, n: int) -> list[str]:
-    rows = sections[name].rows if name in sections else []
-    if len(rows) != n or n == 0:
-        msg = f"section {name} has {len(rows)} rows for {n} atoms, expected one for each ellipsoid"
-        raise ValueError(msg)
-    return rows
-
-
-def _bounds(header: Mapping[str, list[str]]) -> tuple[FloatArray, FloatArray]:
-    bounds = [header.get(f"{x}lo {x}hi", []) for x in "xyz"]
-    tilt = header.get("xy xz yz", ["0"] * 3)
-    if any(len(ends) != 2 for ends in bounds) or len(tilt) != 3:
-        msg = (
-            "the header describes no box, expected 'xlo xhi', 'ylo yhi', 'zlo zhi', and 'xy xz yz' if"
-            " it is tilted"
-        )
-        raise ValueError(msg)
-    return np.array(bounds, dtype=np.float64), np.array(tilt, dtype=np.float64)
-
-
-def _dump_frame(lines: TextIO, *, is_first: bool) -> _Frame:
-    items: dict[str, list[str]] = {}
-    title = lines.readline()
-    while not title.startswith("ITEM: ATOMS "):
-        keyword = next((k for k in _ITEM_ROWS if title.startswith(f"ITEM: {k}")), None)
-        if keyword is None:
-            msg = f"a line reads {title.strip()!r}, expected an 'ITEM:' line of an atom dump"
-            raise ValueError(msg)
-        arguments = title.removeprefix(f"ITEM: {keyword}").strip()
-        items[keyword] = [arguments, *_take(lines, _ITEM_ROWS[keyword])]
-        (title,) = _take(lines, 1)
-    missing = {"TIMESTEP", "NUMBER OF ATOMS", "BOX BOUNDS"} - items.keys()
-    if missing:
-        msg = f"items {sorted(missing)} are missing before the atoms, expected an atom dump"
-        raise ValueError(msg)
-    rows = _take(lines, int(items["NUMBER OF ATOMS"][1]))
-    if rest := lines.readline().strip():
-        msg = f"a line reads {rest!r}, expected an 'ITEM:' line of an atom dump"
-        raise ValueError(msg)
-    names = _plain_names(title.split()[2:])
-    box = _dump_bounds(items["BOX BOUNDS"])
-    columns, others = _dump_columns(names, rows)
-    place = next(names for names in _POSITIONS if set(names) <= set(columns))
-    said = Said(is_later=True)
-    if is_first:
-        said = Said(digits=_digits(rows, names, place), is_scaled=place in _POSITIONS[2:])
-    step, time = int(items["TIMESTEP"][1]), float(items.get("TIME", ["", "0"])[1])
-    boundary = items["BOX BOUNDS"][0]
-    return _Frame(_placed(columns, place, box), *box, said, step, time, joined(others), boundary)
-
-
-def _placed(
-    columns: dict[str, FloatArray], place: Sequence[str], box: tuple[FloatArray, FloatArray]
-) -> dict[str, FloatArray]:
-    """Return columns with positions ``x y z`` from the columns `place`, and images if these are unwrapped."""
-    if place == _POSITION:
-        return columns
-    bounds, tilt = box
-    of = Box(bounds[:, 0], bounds[:, 1] - bounds[:, 0], tilt)
-    position = np.column_stack([columns[name] for name in place])
-    position = of.lo + of.vectors(position) if place in _POSITIONS[2:] else position
-    found = dict(columns)
-    if place in _POSITIONS[1::2]:
-        _, image = of.wrapped(position)
-        position = np.where(
-            image.any(axis=1, keepdims=True), position - of.vectors(image), position
-        )
-        found |= dict(zip(_IMAGE, image.T.astype(np.float64), strict=True))
-    return found | dict(zip(_POSITION, position.T, strict=True))
-
-
-def _plain_names(columns: Sequence[str]) -> list[str]:
-    """Replace names of computes, the only possible ones before ``dump_modify colname``: `quatw` for `c_quatw` or `c_q[1]`."""
-    found = []
-    for column in columns:
-        name, _, number = column.removeprefix(column[:2]).removesuffix("]").partition("[")
-        of = _COMPUTES.get(name, ())
-        is_ours = column[:2] in {"c_", "f_", "v_"}
-        if is_ours and number.isdecimal() and 0 < int(number) <= len(of):
-            name = of[int(number) - 1]
-        is_known = (
-            not number and name in (*_PROPERTIES, *_EXPONENT, *_BLOCKS, *_WIDTHS)
-        ) or name in _PROPERTIES
-        found.append(name if is_ours and is_known else column)
-    return found
-
-
-def _take(lines: TextIO, n: int) -> list[str]:
-    rows = list(itertools.islice(lines, n))
-    if len(rows) < n or not all(row.endswith("\n") for row in rows):
-        msg = "the file ends within the frame, expected a complete one; remove the frame"
-        raise ValueError(msg)
-    return rows
-
-
-def _dump_columns(
-    names: Sequence[str], rows: Sequence[str]
-) -> tuple[dict[str, FloatArray], dict[str, NDArray[Any]]]:
-    """Parse the columns of a frame: those known here, and others."""
-    place = next((own for own in _POSITIONS if set(own) <= set(names)), _POSITION)
-    needed = ["id", "type", *place]
-    if not set(_WIDTHS) & set(names) or set(_PROPERTIES) & set(names):
-        needed += _PROPERTIES
-    missing = [name for name in needed if name not in names]
-    if missing:
-        msg = (
-            f"columns {' '.join(missing)!r} are missing, expected {' '.join(_DUMP_COLUMNS)!r}, or such as"
-            " c_q[1] to c_q[4] and c_shape[1] to c_shape[3]"
-        )
-        raise ValueError(msg)
-    optional = (
-        *_IMAGE,
-        *_EXPONENT,
-        *_BLOCKS,
-        *_ROUNDNESS,
-        *(() if "shapex" in needed else _WIDTHS),
-    )
-    known = _columns(rows, names, [*needed, *(name for name in optional if name in names)])
-    if "shapex" not in known:
-        known |= _round(known)
-    return known, _others(rows, names, set(known))
-
-
-def _others(rows: Sequence[str], names: Sequence[str], known: set[str]) -> dict[str, NDArray[Any]]:
-    """Parse columns of whole numbers, numbers or texts, in the order of the ids."""
-    places = [k for k, name in enumerate(names) if name not in known]
-    if not places:
-        return {}
-    words = [row.split() for row in rows]
-    order = np.argsort(np.array([int(row[names.index("id")]) for row in words]))
-    found: dict[str, NDArray[Any]] = {}
-    for k in places:
-        column = np.array([row[k] for row in words])[order]
-        for kind in (np.int64, np.float64):
-            with contextlib.suppress(ValueError, OverflowError):
-                column = column.astype(kind)
-                break
-        found[names[k]] = column
-    return found
-
-
-def _dump_bounds(item: Sequence[str]) -> tuple[FloatArray, FloatArray]:
-    boundary, *rows = item
-    if not _BOUNDARY.fullmatch(boundary):
-        msg = (
-            f"box bounds are {boundary!r}, expected 'pp pp pp' or 'xy xz yz pp pp pp'; write the dump with"
-            " dump_modify triclinic/general no"
-        )
-        raise ValueError(msg)
-    is_tilted = boundary.startswith("xy")
-    columns = np.array([row.split() for row in rows], dtype=np.float64)
-    if columns.shape != (3, 2 + is_tilted):
-        msg = f"box bounds {boundary!r} have rows of {columns.shape[1]} numbers, expected {2 + is_tilted}"
-        raise ValueError(msg)
-    if not is_tilted:
-        return columns, np.zeros(3)
-    # LAMMPS writes the bounds of the surrounding cuboid.
-    around, tilt = columns[:, :2], columns[:, 2]
-    return around - np.transpose(cuboid_around(Lengths(np.zeros(3), tilt).matrix)), tilt
