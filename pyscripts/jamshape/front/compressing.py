@@ -30,7 +30,7 @@ from jamshape.front.starts import Asked, Start, require_known_kinks
 from jamshape.old_names import accepts_old
 from jamshape.packing import Packing
 from jamshape.protocols.approach import compressed_start
-from jamshape.protocols.random_start import random_packing
+from jamshape.protocols.random_start import compression_start
 from jamshape.shapes.particles import Particles
 
 PHI = (0.4, 0.9)
@@ -158,7 +158,7 @@ def compress(
     at = place(file, "run.h5")
     made_from = particles.identity | {"n": n, "phi_start": phi[0], "seed": seed}
     plan = lammps_driver.plan(
-        lambda: random_packing(n, phi[0], seed, particles, dimension),
+        lambda: compression_start(n, phi[0], seed, particles, dimension),
         settings, Sizes(rows, frames), made_from | {"dimension": dimension},
     )  # fmt: skip
     recorded(at.path, plan, again=again, seconds=seconds, progress=progress)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from jamshape.arrays import FloatArray
-from jamshape.checks import RANGES, require_in, require_one_of, require_stated
+from jamshape.checks import RANGES, Sentence, require_in, require_one_of, require_stated
 from jamshape.packing import Box, Packing
 from jamshape.packing.plain import unturned
 from jamshape.shapes.particles import Particles
@@ -28,8 +28,13 @@ _SAFE = 0.85
 _DENSEST, _LOOSEST = (0.4, 0.2, 0.1, 0.05), 0.02
 
 
-class InsertionError(ValueError):
-    """Random insertion did not find room for all particles."""
+class InsertionError(Sentence, ValueError):
+    """Random insertion did not find room for all particles; parameters as in `Sentence`."""
+
+    def of(self, **given: Any) -> InsertionError:
+        """Return the same error of another argument than ``phi``, such as ``phi_start=0.4``."""
+        (name,) = given
+        return InsertionError(self.template.replace("{phi:name}", f"{{{name}:name}}"), given)
 
 
 def random_packing(
@@ -105,6 +110,16 @@ def start_below(
     return random_packing(n, min(phi, _LOOSEST), seed, particles, dimension)
 
 
+def compression_start(
+    n: int, phi_start: float, seed: int, particles: Particles, dimension: int
+) -> Packing:
+    """Make a random packing as `random_packing`, whose errors then name ``phi_start``."""
+    try:
+        return random_packing(n, phi_start, seed, particles, dimension)
+    except InsertionError as error:
+        raise error.of(phi_start=phi_start) from None
+
+
 def dilute_packing(
     n: int, phi: float, seed: int, particles: Particles | None = None, dimension: int = 3
 ) -> Packing:
@@ -159,15 +174,17 @@ def _refusal(bodies: Any, box: Box, found: Mapping[str, Any]) -> InsertionError:
         fits = phi * (edge / length) ** box.dimension
         return InsertionError(
             f"no direction keeps the longest particle, of length {length:.3g}, off its"
-            f" own periodic images in a box of edge {edge:.3g}: start at phi <= {_SAFE * fits:.2g}"
-            " and compress from there, or take more particles"
+            f" own periodic images in a box of edge {edge:.3g}: start at {{phi:name}} <= {_SAFE * fits:.2g}"
+            " and compress from there, or take more particles",
+            {"phi": phi},
         )
     measure[found["waiting"]] = 0
     reached = measure.sum() / box.volume
     return InsertionError(
         f"random insertion of {len(measure)} particles stalled at phi = {reached:.3g} of the"
         f" {phi:.3g} requested after {found['attempts']} attempts: start at"
-        f" phi <= {_SAFE * reached:.2g} and compress from there"
+        f" {{phi:name}} <= {_SAFE * reached:.2g} and compress from there",
+        {"phi": phi},
     )
 
 

@@ -19,7 +19,7 @@ from jamshape.minima.target import FixedBox, Target, bisection, extrapolation
 from jamshape.packing import Packing
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.quasistatic import Quasistatic
-from jamshape.protocols.random_start import dilute_packing, random_packing
+from jamshape.protocols.random_start import compression_start, dilute_packing
 from jamshape.shapes.particles import Particles
 
 SEARCHES = {"extrapolation": extrapolation, "bisection": bisection}
@@ -94,7 +94,7 @@ class Steps:
 
     def start(self, recipe: Recipe) -> Packing:
         """Make the random start, which in space may have overlaps: the first minimisation removes them."""
-        make = random_packing if recipe.dimension == 2 else dilute_packing
+        make = compression_start if recipe.dimension == 2 else dilute_packing
         return make(recipe.n, recipe.phi_start, recipe.seed, recipe.particles, recipe.dimension)
 
     def compression(self, target: Aim | None) -> Quasistatic:
@@ -154,7 +154,7 @@ class Dynamics:
 
     def start(self, recipe: Recipe) -> Packing:
         """Make the random start, without overlaps."""
-        return random_packing(
+        return compression_start(
             recipe.n, recipe.phi_start, recipe.seed, recipe.particles, recipe.dimension
         )
 
@@ -217,7 +217,7 @@ class Compressed:
         if self.source is not None:
             first = read_packing(self.source, 0)
             return first.with_(law=first.law.but(sides=2))
-        return random_packing(
+        return compression_start(
             recipe.n, recipe.phi_start, recipe.seed, recipe.particles, recipe.dimension
         )
 
