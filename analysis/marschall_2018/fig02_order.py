@@ -4,7 +4,8 @@
 
 Runs of pyscripts/compress.py that differ in their seed only are averaged. In the plane sqrt(N) S_n that depends
 neither on N nor on phi, at the dashed line, is the order of random orientations: none. The last
-line of standard output is one JSON object with the averages over phi.
+line of standard output is one JSON object with the averages over phi, and the rise of the order, sample by sample, from
+the start to --rise-to.
 """
 
 from __future__ import annotations
@@ -46,6 +47,8 @@ class Curve(NamedTuple):
     """(2, POINTS), 0 for one sample."""
     over_phi: tuple[Mean, Mean]
     """Averages over phi, whose errors are those over samples."""
+    rise: tuple[Mean, Mean]
+    """From the start to a packing fraction, sample by sample."""
     samples: int
 
 
@@ -58,8 +61,8 @@ def read(paths: list[Path]) -> dict[Ensemble, Samples]:
     return dict(sorted(runs.items(), key=lambda item: item[0].n))
 
 
-def average(n: int, runs: Samples) -> Curve:
-    """Average sqrt(N) S_n over samples where all have been."""
+def average(n: int, runs: Samples, rise_to: float) -> Curve:
+    """Average sqrt(N) S_n over samples where all have been, and its rise to a packing fraction among these, or to the last."""
     start, end = max(run["phi"][0] for run in runs), min(run["phi"][-1] for run in runs)
     if not start < end:
         msg = f"runs with N = {n} share no range of phi, expected compressions that overlap"
@@ -69,7 +72,10 @@ def average(n: int, runs: Samples) -> Curve:
     scaled = np.sqrt(n) * S
     nematic, tetratic = scaled.mean(axis=2).T
     over_phi = (mean(nematic), mean(tetratic))
-    return Curve(phi, scaled.mean(axis=0), standard_error(scaled), over_phi, len(runs))
+    until = np.array([[np.interp(rise_to, phi, S_n) for S_n in sample] for sample in scaled])
+    nematic, tetratic = (until - scaled[:, :, 0]).T
+    rise = (mean(nematic), mean(tetratic))
+    return Curve(phi, scaled.mean(axis=0), standard_error(scaled), over_phi, rise, len(runs))
 
 
 def draw(curves: dict[Ensemble, Curve], options: Namespace) -> None:
@@ -102,15 +108,20 @@ def draw(curves: dict[Ensemble, Curve], options: Namespace) -> None:
 def main(options: Namespace) -> None:
     """Read, average, draw, report."""
     runs = read(options.files)
-    curves = {ensemble: average(ensemble.n, samples) for ensemble, samples in runs.items()}
+    curves = {of: average(of.n, samples, options.rise_to) for of, samples in runs.items()}
     draw(curves, options)
     rows = []
     for ensemble, curve in curves.items():
         means = {f"sqrtN_{n}": of._asdict() for n, of in zip(ORDERS, curve.over_phi, strict=True)}
+        means |= {f"rise_{n}": of._asdict() for n, of in zip(ORDERS, curve.rise, strict=True)}
         row = ensemble.report() | {"phi_start": curve.phi[0], "phi_end": curve.phi[-1]}
         rows.append(row | means)
     report({"out": options.out, "random": RANDOM, "ensembles": rows})
 
 
 if __name__ == "__main__":
-    run(parser_of(__doc__, "order.png", "RUN.h5"), main)
+    parser = parser_of(__doc__, "order.png", "RUN.h5")
+    parser.add_argument(
+        "--rise-to", type=float, default=1.0, metavar="PHI", help="packing fraction (the last one)"
+    )
+    run(parser, main)

@@ -39,8 +39,8 @@ def packing(angle=(0.0, 0.0, 0.0)):
     )
 
 
-def compression(path, seed=1, shift=0.0, ends=(0.8, 0.9), slope=0.2, **attributes):
-    """A run whose pressure is a line from PHI_J + shift on, of particles at random angles."""
+def compression(path, seed=1, shift=0.0, ends=(0.8, 0.9), slope=0.2, ordering=0.0, **attributes):
+    """A run whose pressure is a line from PHI_J + shift on, of particles at random angles, whose order grows."""
     rng = np.random.default_rng(seed)
     first = packing(rng.uniform(0, 7, 3))
     known = {"alpha": 4.0, "n": 1024, "kappa": 1e-6, "size_ratio": 1.4, "k_e": 1.0, "sides": 2}
@@ -49,7 +49,7 @@ def compression(path, seed=1, shift=0.0, ends=(0.8, 0.9), slope=0.2, **attribute
     S = {f"S_{k}": orientational_order(rng.uniform(0, 7, n), k).S_n for k in (2, 4)}
     phi, steps = np.linspace(*ends, 81), np.arange(81)
     rows = {"phi": phi, "pressure": slope * np.maximum(phi - PHI_J - shift, 0)}
-    rows |= {name: np.full(81, value) for name, value in S.items()}
+    rows |= {name: value + ordering * (phi - phi[0]) for name, value in S.items()}
     values = [{name: column[k] for name, column in rows.items()} for k in steps]
     write_content(
         path, [first], known, zip(steps.tolist(), (steps / 3).tolist(), values, strict=True)
@@ -141,6 +141,18 @@ def test_order_of_samples(report, tmp_path):
     assert means[400]["value"] == pytest.approx(20 * np.mean(S_2))
     assert means[400]["error"] == pytest.approx(20 * np.std(S_2, ddof=1) / np.sqrt(3))
     image(tmp_path / "order.png")
+
+
+@pytest.mark.usefixtures("undrawn")
+@pytest.mark.parametrize(("asked", "phi"), [((), 0.9), (("--rise-to", 0.83), 0.83)])
+def test_rise_of_the_order(report, tmp_path, asked, phi):
+    slopes = (0.1, 0.2, 0.6)
+    runs = [compression(tmp_path / f"{k}.h5", k, ordering=s) for k, s in enumerate(slopes)]
+    (found,) = report(ORDER, *runs, *asked, "--out", tmp_path / "order.png")["ensembles"]
+    for name in ("rise_S_2", "rise_S_4"):
+        assert found[name]["value"] == pytest.approx(32 * 0.3 * (phi - 0.8))
+        error = np.std(slopes, ddof=1) / np.sqrt(3)
+        assert found[name]["error"] == pytest.approx(32 * error * (phi - 0.8))
 
 
 @pytest.mark.usefixtures("undrawn")
