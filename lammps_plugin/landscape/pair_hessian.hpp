@@ -97,7 +97,7 @@ template <class Model, int D> class PairHessian {
   const NearPairs<D> &pairs;
   std::unique_ptr<BlockSystem> systems[2];  // without fill-in and with it, once they are used
   BlockSystem *present = nullptr;           // the one last used
-  std::vector<TurnMatrix> axes;  // (N,) of its rotations in space; empty if these are its
+  std::vector<TurnMatrix> axes;  // (N,) of rotations in space by coordinates; empty if equal
   std::vector<Kink> held_kinks;
   Vec<D> strained;
   Eigen::VectorXd pulled;  // by the strain of these axes
