@@ -61,21 +61,32 @@ def read(paths: list[Path]) -> dict[Ensemble, Samples]:
     return dict(sorted(runs.items(), key=lambda item: item[0].n))
 
 
-def average(n: int, runs: Samples, rise_to: float) -> Curve:
-    """Average sqrt(N) S_n over samples where all have been, and its rise to a packing fraction among these, or to the last."""
+def average(n: int, runs: Samples, rise_to: float | None) -> Curve:
+    """Average sqrt(N) S_n over samples where all have been, and its rise to a packing fraction there (the last)."""
     start, end = max(run["phi"][0] for run in runs), min(run["phi"][-1] for run in runs)
     if not start < end:
         msg = f"runs with N = {n} share no range of phi, expected compressions that overlap"
         raise ValueError(msg)
+    last = end if rise_to is None else rise_to
+    if not start <= last <= end:
+        msg = f"--rise-to is {last:g}, expected from {start:.4g} to {end:.4g}, where all runs with N = {n} have been"
+        raise ValueError(msg)
     phi = np.linspace(start, end, POINTS)
-    S = np.array([[np.interp(phi, run["phi"], run[name]) for name in ORDERS] for run in runs])
-    scaled = np.sqrt(n) * S
-    nematic, tetratic = scaled.mean(axis=2).T
-    over_phi = (mean(nematic), mean(tetratic))
-    until = np.array([[np.interp(rise_to, phi, S_n) for S_n in sample] for sample in scaled])
-    nematic, tetratic = (until - scaled[:, :, 0]).T
-    rise = (mean(nematic), mean(tetratic))
+    scaled, ends = sampled(n, runs, phi), sampled(n, runs, np.array([start, last]))
+    over_phi, rise = both(scaled.mean(axis=2)), both(ends[:, :, 1] - ends[:, :, 0])
     return Curve(phi, scaled.mean(axis=0), standard_error(scaled), over_phi, rise, len(runs))
+
+
+def sampled(n: int, runs: Samples, phi: FloatArray) -> FloatArray:
+    """(m, 2, k) sqrt(N) S_n of m runs at k packing fractions."""
+    at = [[np.interp(phi, run["phi"], run[name]) for name in ORDERS] for run in runs]
+    return np.asarray(np.sqrt(n) * np.array(at))
+
+
+def both(orders: FloatArray) -> tuple[Mean, Mean]:
+    """Average (m, 2) nematic and tetratic order over m samples."""
+    nematic, tetratic = orders.T
+    return mean(nematic), mean(tetratic)
 
 
 def draw(curves: dict[Ensemble, Curve], options: Namespace) -> None:
@@ -122,6 +133,6 @@ def main(options: Namespace) -> None:
 if __name__ == "__main__":
     parser = parser_of(__doc__, "order.png", "RUN.h5")
     parser.add_argument(
-        "--rise-to", type=float, default=1.0, metavar="PHI", help="packing fraction (the last one)"
+        "--rise-to", type=float, metavar="PHI", help="packing fraction (the last one)"
     )
     run(parser, main)

@@ -192,11 +192,11 @@ template <class Model, int D> class PairHessian {
   void each_curved(const Moved &posed, const std::optional<TurnedBodies<Moved>> &turned_bodies,
                    const Range &part, const Start *starts, const Then &then) const
   {
-    std::map<std::size_t, const Kink *> kink_of;
+    std::map<std::size_t, const Kink *> held_on;
     if constexpr (HAS_KINKS) {
       const auto numbers = numbers_of(pairs, held_kinks);
       for (std::size_t k = 0; k < numbers.size(); ++k) {
-        if (numbers[k]) kink_of[*numbers[k]] = &held_kinks[k];
+        if (numbers[k]) held_on[*numbers[k]] = &held_kinks[k];
       }
     }
     for (std::size_t p = part.first; p < part.last; ++p) {
@@ -207,8 +207,8 @@ template <class Model, int D> class PairHessian {
       if (found.turns) {
         const DualContact dual = turned_bodies->contact(p, r, &start);
         if (dual.status != ContactStatus::TOUCHING) continue;
-        const auto held = kink_of.find(p);
-        if (held == kink_of.end()) {
+        const auto held = held_on.find(p);
+        if (held == held_on.end()) {
           found.by = by_variables(p, dual);
         } else if constexpr (HAS_KINKS) {
           const Kink &kink = *held->second;

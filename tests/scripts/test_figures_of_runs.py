@@ -155,6 +155,13 @@ def test_rise_of_the_order(report, tmp_path, asked, phi):
         assert found[name]["error"] == pytest.approx(32 * error * (phi - 0.8))
 
 
+@pytest.mark.parametrize("phi", [0.79, 0.91])
+def test_rise_beyond_the_runs_is_refused(problem, tmp_path, phi):
+    one = compression(tmp_path / "one.h5")
+    said = problem(ORDER, one, "--rise-to", phi, "--out", tmp_path / "o.png")
+    assert f"--rise-to is {phi}, expected from 0.8 to 0.9, where all runs with N = 1024" in said
+
+
 @pytest.mark.usefixtures("undrawn")
 def test_order_of_one_run_and_of_runs_that_do_not_overlap(report, problem, tmp_path):
     one = compression(tmp_path / "one.h5")

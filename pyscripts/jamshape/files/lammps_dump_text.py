@@ -134,13 +134,8 @@ def _dump_columns(
             " c_q[1] to c_q[4] and c_shape[1] to c_shape[3]"
         )
         raise ValueError(msg)
-    optional = (
-        *IMAGE,
-        *EXPONENT,
-        *BLOCKS,
-        *ROUNDNESS,
-        *(() if "shapex" in needed else WIDTHS),
-    )
+    widths = () if "shapex" in needed else WIDTHS
+    optional = (*IMAGE, *EXPONENT, *BLOCKS, *ROUNDNESS, *widths)
     known = columns_of(rows, names, [*needed, *(name for name in optional if name in names)])
     if "shapex" not in known:
         known |= round_columns(known)
