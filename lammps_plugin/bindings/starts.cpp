@@ -44,12 +44,11 @@ const char *name_of(Inserted outcome)
 }
 
 template <class Model, int D>
-nb::dict inserted(const ShapeOf<Model> &of, const Vec<D> &edges, const DrawnInPython &draw,
-                  std::size_t most_attempts)
+nb::dict inserted(const ShapeOf<Model> &of, const Vec<D> &edges, const DrawnInPython &draw)
 {
   using Insertion = RandomInsertion<Model, D>;
   Insertion insertion(of.shapes(), edges);
-  const Inserted outcome = insertion.run(draw, most_attempts);
+  const Inserted outcome = insertion.run(draw);
   NewArray<double> position({of.n(), D}),
       orientation({of.n(), static_cast<std::size_t>(Insertion::PER_ORIENTATION)});
   for (std::size_t i = 0; i < of.n(); ++i) {
@@ -79,16 +78,15 @@ void export_starts()
     class_of<Model>().def(
         "insert",
         [](const ShapeOf<Model> &of, const Array1<double> &edges, const nb::callable &positions,
-           const nb::callable &orientations, std::size_t most_attempts) {
+           const nb::callable &orientations) {
           return of.in_space([&](auto D) {
             require(of.n() > 0 && edges.shape(0) == D,
                     "edges do not have the shape (D,), or there are no particles.");
             require_edges(edges.data(), D);
-            return inserted<Model, D>(of, read_vec<D>(edges.data()), {positions, orientations},
-                                      most_attempts);
+            return inserted<Model, D>(of, read_vec<D>(edges.data()), {positions, orientations});
           });
         },
-        "edges"_a, "positions"_a, "orientations"_a, "most_attempts"_a,
+        "edges"_a, "positions"_a, "orientations"_a,
         "Random insertion of the particles, the longest first, into a periodic box: "
         "`positions(n)`\n"
         "draws (n, D) numbers in [0, 1), `orientations(n)` (n, 1) angles or (n, 4) quaternions.\n"

@@ -19,7 +19,7 @@ namespace jamshape {
 enum class Inserted {
   ALL,
   TOO_SHORT,  // the longest particle meets its own periodic images in every direction tried
-  STALLED     // no room found after the attempts allowed
+  STALLED     // no room found after many attempts
 };
 
 /// Random sequential insertion of hard particles in a periodic box, the longest first, since early
@@ -47,8 +47,9 @@ template <class Model, int D> class RandomInsertion {
     std::iota(waiting.begin(), waiting.end(), std::size_t{0});
   }
 
-  template <class Draw> Inserted run(Draw &draw, std::size_t most_attempts)
+  template <class Draw> Inserted run(Draw &draw)
   {
+    const std::size_t most_attempts = ATTEMPTS + ATTEMPTS_PER_PARTICLE * n;
     double pairs_per_trial = static_cast<double>(n);
     for (int k = 0; k < D; ++k) pairs_per_trial *= 2.0 * reach / edges[k];
     if (pairs_per_trial > MOST_PAIRS) return Inserted::TOO_SHORT;
@@ -82,6 +83,8 @@ template <class Model, int D> class RandomInsertion {
  private:
   using Body = typename Model::template Body<D>;
 
+  /// Trial placements before insertion counts as stalled: half a second for 1000 particles.
+  static constexpr std::size_t ATTEMPTS = 1'000'000, ATTEMPTS_PER_PARTICLE = 2000;
   /// Most trials tested in one batch, and most products of those and the particles near one.
   static constexpr std::size_t MOST_TRIALS = 4096;
   static constexpr double MOST_PAIRS = 524288.0;

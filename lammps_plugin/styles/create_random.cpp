@@ -26,8 +26,6 @@ namespace jamshape {
 namespace {
 
 constexpr int MOST_PARTICLES = 10'000'000;
-// A few seconds for 1000 particles; the same as in Python's `random_packing`.
-constexpr std::size_t ATTEMPTS = 200'000, ATTEMPTS_PER_PARTICLE = 500;
 constexpr double TWO_PI = 6.283185307179586;
 
 /// Random numbers of an insertion, drawn in the same order as by Python's `random_packing`.
@@ -190,7 +188,7 @@ template <class Model, int D> CreateRandom::Start CreateRandom::start()
   NumpyRandom random(seed);
   Draw<D> draw(random);
   RandomInsertion<Model, D> insertion(shapes, edges);
-  const Inserted outcome = insertion.run(draw, ATTEMPTS + ATTEMPTS_PER_PARTICLE * shapes.size());
+  const Inserted outcome = insertion.run(draw);
   require(outcome != Inserted::TOO_SHORT,
           "a box longer than the longest particle: a smaller PHI, or more particles");
   double placed = 0.0;

@@ -126,7 +126,6 @@ class _Shape:
         edges: _Reals,
         positions: Callable[[int], _Reals],
         orientations: Callable[[int], _Reals],
-        most_attempts: int,
     ) -> dict[str, Any]: ...
     def sweeps(
         self,

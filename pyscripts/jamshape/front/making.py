@@ -82,7 +82,8 @@ def make_packing(
         Largest net force and torque on a particle over the mean force of a bond; 1e-8 by default, or
         1e-4 for equal steps.
     phi_start : float, optional
-        Packing fraction of the random start; 0.4 in 2D, 0.1 in 3D by default.
+        Packing fraction of the random start; 0.4 in 2D, 0.1 in 3D by default, and less for particles of more than 11 (21)
+        times their width, which would jam or find no room.
     kappa : float, [1/time], optional
         Slowest compression rate of ``dynamics``, 4e-7 by default, or the only rate of marschall-2018,
         1e-6 by default.

@@ -23,6 +23,7 @@ from jamshape.minima.boxes import FIXED, FREE, ISOTROPIC, Yielding
 from jamshape.minima.target import Target
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.quasistatic import Quasistatic
+from jamshape.protocols.random_start import usual_phi_start
 from jamshape.protocols.recipe import (
     Adaptive,
     Compressed,
@@ -226,7 +227,10 @@ def recipe_for(
     require_with("u0", get["u0"] or None, accuracy=given.get("accuracy"))
     get |= {} if source is None else _of_source(source, given)
     how, target = usual.compose(get)
-    numbers = (get["n"], dimension, 1 if seed is None else seed, get["phi_start"])
+    sizes = get["n"], 1 if seed is None else seed, particles, dimension
+    if source is None and given.get("phi_start") is None:
+        get["phi_start"] = usual_phi_start(get["phi_start"], *sizes)
+    numbers = (get["n"], dimension, sizes[1], get["phi_start"])
     return Recipe(particles, *numbers, how, aim or target, strict=strict, stable_to_shear=stable)
 
 

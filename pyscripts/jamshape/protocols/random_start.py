@@ -16,13 +16,14 @@ from jamshape.packing.plain import unturned
 from jamshape.shapes.particles import Particles
 from jamshape.shapes.shape import Interaction
 
-# Trial placements: a few seconds for 1000 particles.
-_ATTEMPTS, _ATTEMPTS_PER_PARTICLE = 200_000, 500
-
 # Safe fraction of the packing fraction where insertion stalls: the long
 # particles, placed first, fill their share of a box that is too small better than all do together.
 _SAFE = 0.85
 
+
+# Packing fraction with room for long particles, over their width divided by their length: in 2D to insert them, in 3D to
+# push them apart without a jam.
+_ROOM = {2: 3.55, 3: 1.75}
 
 # Packing fractions to try for starts of compressions.
 _DENSEST, _LOOSEST = (0.4, 0.2, 0.1, 0.05), 0.02
@@ -83,7 +84,6 @@ def random_packing(
         box.edges,
         lambda m: rng.random((m, dimension)),
         lambda m: _random_orientations(m, dimension, rng).reshape(m, -1),
-        _ATTEMPTS + _ATTEMPTS_PER_PARTICLE * n,
     )
     if found["outcome"] != "all":
         raise _refusal(bodies, box, found)
@@ -118,6 +118,21 @@ def compression_start(
         return random_packing(n, phi_start, seed, particles, dimension)
     except InsertionError as error:
         raise error.of(phi_start=phi_start) from None
+
+
+def usual_phi_start(
+    densest: float, n: int, seed: int, particles: Particles, dimension: int
+) -> float:
+    """Return a packing fraction to start compressions from: `densest`, or a smaller one of particles that are long.
+
+    The area (volume) that a rod excludes grows with the square of its length, so that its neighbours block it from a packing
+    fraction on that is proportional to its width over its length. This ratio is estimated from the area of a particle over
+    that of the circle around it, and in 3D from the square root of the fraction of the sphere.
+    """
+    unplaced, _ = _unplaced(n, densest, seed, (particles, dimension))
+    balls = np.pi / (1.0 if dimension == 2 else 0.75) * unplaced.outer_radius**dimension
+    width_over_length = (math.fsum(unplaced.measures) / math.fsum(balls)) ** (1 / (dimension - 1))
+    return min(densest, float(f"{_ROOM[dimension] * width_over_length:.2g}"))
 
 
 def dilute_packing(

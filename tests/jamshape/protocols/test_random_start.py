@@ -13,8 +13,10 @@ from mixtures import ROD, bidisperse, monodisperse, of_arrays
 from jamshape import _contact
 from jamshape.files.h5md import read_packing
 from jamshape.files.lammps_text import read_data
+from jamshape.landscape import Landscape, State
 from jamshape.measures.order import orientational_order
-from jamshape.protocols.random_start import InsertionError, random_packing
+from jamshape.minima import Outcome, Stop, minimise
+from jamshape.protocols.random_start import InsertionError, dilute_packing, random_packing, usual_phi_start
 from jamshape.shapes.particles import Particles, Sizes
 from jamshape.shapes.table import shape_named
 
@@ -136,9 +138,7 @@ def test_any_distribution():
         (64, bidisperse(2), 3),
     ],
 )
-def test_recommended_start_works(n, mixture, dimension, monkeypatch):
-    monkeypatch.setattr("jamshape.protocols.random_start._ATTEMPTS", 50_000)
-    monkeypatch.setattr("jamshape.protocols.random_start._ATTEMPTS_PER_PARTICLE", 0)
+def test_recommended_start_works(n, mixture, dimension):
     sentence = (
         rf"^random insertion of {n} particles stalled at phi = 0\.\d+ of the 0\.95 requested after"
         r" \d+ attempts: start at phi <= (0\.\d+) and compress from there$"
@@ -147,6 +147,24 @@ def test_recommended_start_works(n, mixture, dimension, monkeypatch):
         random_packing(n, 0.95, 1, mixture, dimension=dimension)
     phi = float(re.match(sentence, str(error.value))[1])
     assert random_packing(n, phi, 1, mixture, dimension=dimension).n == n
+
+
+@pytest.mark.parametrize("n", [16, 64, 256])
+@pytest.mark.parametrize("alpha", [8, 10, 11, 14, 20, 50, 100])
+def test_usual_start_has_room_for_long_particles(alpha, n):
+    mixture = bidisperse(alpha)
+    for seed in range(1, 9):
+        phi = usual_phi_start(0.4, n, seed, mixture, 2)
+        assert (phi == 0.4) == (alpha <= 10)
+        assert random_packing(n, phi, seed, mixture).n == n
+
+
+def test_usual_start_of_long_particles_in_3d_is_not_jammed():
+    assert usual_phi_start(0.1, 100, 1, bidisperse(20), 3) == 0.1
+    phi = usual_phi_start(0.1, 100, 1, bidisperse(50), 3)
+    start = dilute_packing(100, phi, 1, bidisperse(50), 3)
+    found = minimise(Landscape(start), State.of(start), "auto", Stop(1e-2, lowest=1e-16))
+    assert found.outcome is Outcome.UNJAMMED
 
 
 @pytest.mark.parametrize(("alpha", "dimension"), [(2, 2), (1e8, 2), (1, 3)])
