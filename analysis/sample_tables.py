@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from common.ensembles import OTHERS
+from common.stressed import AT_PRESSURE, of_pressure, with_sure_slope
 from jamshape.command import parser_of, report, run
 from jamshape.files.h5md import read_attributes, read_style
 from jamshape.files.outcomes import is_reached
@@ -53,7 +54,6 @@ SHEAR = (
     *SHAPE, "phi", "gdot", "flow", "integrator", "strain", "startup",
     *STEADY, *(f"{name}_error" for name in STEADY),
 )  # fmt: skip
-AT_PRESSURE = ("G", "slope")
 
 
 def told_packing(path: Path) -> dict[str, Any]:
@@ -91,9 +91,9 @@ def told_shear(path: Path) -> dict[str, Any] | None:
 
 def told_series(path: Path) -> dict[str, Any]:
     """Read a packing at several pressures, a column for each number at each of them."""
-    rows = json.loads(path.read_text(encoding="utf-8"))
+    rows = [with_sure_slope(row) for row in json.loads(path.read_text(encoding="utf-8"))]
     of_all = {name: rows[0][name] for name in ("alpha", "n", "seed")}
-    at = {f"{name} at {row['pressure']:g}": row.get(name) for name in AT_PRESSURE for row in rows}
+    at = {of_pressure(name, row): row.get(name) for name in AT_PRESSURE for row in rows}
     return of_all | at
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import warnings
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -36,6 +37,10 @@ FOLLOWED = "common.stressed:followed"
 # Relative step of the pressure to the same contacts: far less than between changes of contacts, and the change of G is
 # far above the bounds of both.
 STEP = 1e-3
+
+
+# Numbers of a packing at each of its pressures, in tables.
+AT_PRESSURE = ("G", "slope")
 
 
 class Series(NamedTuple):
@@ -231,16 +236,46 @@ def rows_of(folder: Path, tasks: Sequence[Task]) -> list[list[dict[str, Any]]]:
     """Read the results of those of the tasks that are finished."""
     paths = [folder / one.file for one in tasks]
     rows = [json.loads(path.read_text()) for path in paths if path.exists()]
+    rows = [[with_sure_slope(row) for row in of] for of in rows]
     if not rows:
         msg = f"{folder} has no results of {tasks[0].file} and others, expected some; leave out --only-kept"
         raise ValueError(msg)
     return rows
 
 
-def table_of(folder: Path, series: Iterable[Series]) -> Table:
-    """Read the finished ones of series with the same pressures."""
+def with_sure_slope(row: dict[str, Any]) -> dict[str, Any]:
+    """Drop a slope whose sign is uncertain."""
+    is_sure = row.get("slope") is None or row["slope_bound"] < abs(row["slope"])
+    return row if is_sure else row | {"slope": None}
+
+
+def of_pressure(name: str, row: Mapping[str, Any]) -> str:
+    """Name the column of a number at the pressure of a row."""
+    return f"{name} at {row['pressure']:g}"
+
+
+def table_of(runs: Path, series: Iterable[Series]) -> Table:
+    """Read the finished ones of series with the same pressures, from a folder or the table of sample_tables.py."""
     every = list(series)
-    return Table(np.array(every[0].pressures), rows_of(folder, every))
+    pressures = every[0].pressures
+    read = _lines_of if runs.is_file() else rows_of
+    return Table(np.array(pressures), read(runs, every))
+
+
+def _lines_of(table: Path, series: Sequence[Series]) -> list[list[dict[str, Any]]]:
+    with table.open(newline="", encoding="utf-8") as file:
+        lines = {Path(line["file"]).name: line for line in csv.DictReader(file)}
+    known = [(one.pressures, lines[one.file]) for one in series if one.file in lines]
+    if not known:
+        msg = f"{table} has no line of {series[0].file} and others, expected some; choose another table"
+        raise ValueError(msg)
+    return [[_at(line, p) for p in pressures] for pressures, line in known]
+
+
+def _at(line: Mapping[str, str], pressure: float) -> dict[str, Any]:
+    row: dict[str, Any] = {"pressure": pressure}
+    cells = {name: line.get(of_pressure(name, row)) for name in AT_PRESSURE}
+    return row | {name: float(cell) for name, cell in cells.items() if cell}
 
 
 def write_table(options: Namespace, found: Any) -> None:

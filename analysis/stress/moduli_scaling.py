@@ -6,7 +6,7 @@ Each packing is made at the lowest pressure, in a box that changes its volume on
 other, as by Zhang, VanderWerf, Li, Zhang, Shattuck & O'Hern, Phys. Rev. E 104, 014901 (2021). G is the change of the shear stress
 under simple shear at a fixed volume. Averages are over all packings, over those of positive G only, and over all packings and all directions of
 shear. Fits are weighted by the standard errors; the errors of beta and G_0 are those of the bootstrap over packings. Finished packings are kept in --runs: a command that is stopped and
-repeated goes on. The last line of standard output is one JSON object.
+repeated goes on. With series.csv of sample_tables.py in place of that folder it draws from the table. The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Scaling(NamedTuple):
     samples: int
     p: FloatArray
     averages: dict[str, Average]
-    """By `AVERAGES`."""
+    """By `AVERAGES`; tables of packings have no directions."""
     positive: FloatArray
     """(k,) fraction of packings of positive G."""
     undefined: FloatArray
@@ -66,7 +66,8 @@ class Scaling(NamedTuple):
 def columns_of(table: Table) -> dict[str, FloatArray]:
     """List (m, k) moduli to average, as in `AVERAGES`."""
     G = table.column("G")
-    return dict(zip(AVERAGES, (G, np.where(G > 0, G, np.nan), table.column("G_dc")), strict=True))
+    found = dict(zip(AVERAGES, (G, np.where(G > 0, G, np.nan), table.column("G_dc")), strict=True))
+    return {name: of for name, of in found.items() if name in DRAWN or np.isfinite(of).any()}
 
 
 def scaling_of(alpha: float, n: int, table: Table, last: float) -> Scaling:
@@ -159,7 +160,7 @@ def main(options: Namespace) -> None:
         for seed in seeds
         for alpha in options.alpha
     ]
-    if not options.only_kept:
+    if not (options.only_kept or options.runs.is_file()):
         found_of(options.runs, every, options.jobs)
     tables = [
         table_of(options.runs, (one for one in every if one.alpha == a)) for a in options.alpha

@@ -2,7 +2,7 @@
 
     python analysis/zhang_2021/families.py --alpha 0 1 --n 64 --samples 50 --runs series --out families.png
 
-Reads what compress.py made. A geometrical family is a packing at the pressures at which its contacts stay the same. As by
+Reads what compress.py made, or series.csv of sample_tables.py (--runs). A geometrical family is a packing at the pressures at which its contacts stay the same. As by
 Zhang, VanderWerf, Li, Zhang, Shattuck & O'Hern, Phys. Rev. E 104, 014901 (2021), <G> = <G_f> + <G_r>: G_f begins at <G> of the
 lowest pressure and grows by the mean of dG/dp along families (trapezoidal rule); changes of contacts contribute the rest, G_r.
 Errors are those of the bootstrap over packings. The last line of standard output is one JSON object.
@@ -72,7 +72,6 @@ class Families(NamedTuple):
 def families_of(alpha: float, n: int, table: Table) -> Families:
     """Average a system."""
     G, slopes, p = table.column("G"), table.column("slope"), table.pressures
-    slopes = np.where(table.column("slope_bound") < np.abs(slopes), slopes, np.nan)
     drawn = [by_families(p, mean_of(G[k]), mean_of(slopes[k])) for k in draws(len(G))]
     slope, of_G = Means(*mean_and_error(slopes)), Means(*mean_and_error(G))
     G_f = Means(by_families(p, of_G.value, slope.value), np.std(drawn, axis=0))

@@ -82,3 +82,19 @@ def test_the_table_has_a_line_for_each_packing(report, made):
     [first, *_] = json.loads((made / lines[2]["file"]).read_text())
     assert float(lines[2]["G at 1e-06"]) == pytest.approx(first["G"], rel=1e-9)
     assert float(lines[2]["slope at 1e-06"]) == pytest.approx(first["slope"], rel=1e-9)
+
+
+def test_figures_from_a_table_are_those_from_its_packings(report, series, made, tmp_path):
+    report("sample_tables.py", made, "--out", made / "samples")
+    sources, out = (series, made / "samples" / "series.csv"), tmp_path / "f.png"
+    for call in ((f"{FOLDER}/families.py", "--alpha", 0, 1), ("stress/moduli_scaling.py",)):
+        drawn = [report(*call, *SMALL, "--runs", x, "--out", out)["systems"] for x in sources]
+        for one, other in zip(*(flat(systems) for systems in drawn), strict=True):
+            assert one == pytest.approx(other, rel=1e-6, abs=1e-9, nan_ok=True)
+
+
+def flat(systems):
+    """Numbers of each system and each of its pressures, without averages over directions, which tables do not have."""
+    rows = [row for of in systems for row in (of, *of["points"], *of.get("fits", {}).values())]
+    keep = [{k: x for k, x in row.items() if "directions" not in k} for row in rows]
+    return [{k: x for k, x in row.items() if isinstance(x, int | float)} for row in keep]
