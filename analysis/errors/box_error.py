@@ -5,7 +5,7 @@
 Discs and rods of alpha = 4 in 2D, spheroids in 3D. A packing at an energy, in a box that changed its volume only and so with a shear
 stress, is led to each pressure in a free box. After every step of the box are recorded: the largest difference of the pressure tensor to p 1, over p;
 the largest net force and torque over the mean force of a bond; and the seconds so far in which the processor was busy. A curve is the smallest
-value so far of each. The last line of standard output is one JSON object.
+value so far of the larger one of both errors. The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations
@@ -101,18 +101,18 @@ def figure_from(curves: list[Curve], n: int) -> Figure:
     for axes, name in zip(panels, shapes, strict=True):
         own = [of for of in curves if of.shape == name]
         for k, of in enumerate(own):
-            for line, values in (("-", of.stress), ("--", of.residual)):
-                best = np.maximum(np.minimum.accumulate(values), LEAST)
-                axes.step(of.seconds, best, line, where="post", lw=1, color=color(k),
-                          label=f"$p=10^{{{np.log10(of.pressure):.0f}}}$" if line == "-" else None)  # fmt: skip
+            larger = np.maximum(of.stress, of.residual)
+            best = np.maximum(np.minimum.accumulate(larger), LEAST)
+            label = f"$p=10^{{{np.log10(of.pressure):.0f}}}$"
+            axes.step(of.seconds, best, where="post", lw=1, color=color(k), label=label)
         axes.axhline(1e-8, color="0.6", lw=0.8, ls=":")
         axes.set(xscale="log", yscale="log", xlabel="core seconds")
         axes.set_title(f"{name}, $N={n}$", fontsize=9)
     panels[0].set_ylabel("relative error")
     panels[0].legend(fontsize=7)
     figure.suptitle(
-        f"free boxes led to $p$ from $u_0=${U0:g}: error of the pressure tensor over $p$ (full), largest net force over the"
-        "\nmean force of a bond (dashed), smallest so far; dotted: both are required",
+        f"boxes of variable shape brought to $p$ from $u_0=${U0:g}: the larger of the error of the pressure tensor over $p$"
+        "\nand of the largest net force over the mean force of a bond, smallest so far; dotted: required",
         fontsize=9,
     )
     return figure

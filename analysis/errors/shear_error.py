@@ -219,7 +219,7 @@ def draw(rows: list[Row], path: Path) -> None:
     for axis in panels[:, 0]:
         axis.set_ylabel("relative error of $p$")
     for axis in panels[-1]:
-        axis.set_xlabel("seconds of the processor")
+        axis.set_xlabel("CPU time (s)")
     name_median_and_largest(panels[0, 0])
     save_figure(figure, path)
 

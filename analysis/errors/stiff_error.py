@@ -167,7 +167,7 @@ def draw(runs: list[dict[str, Any]], rows: list[Row], options: Namespace, name: 
         errors = [(r.cpu_seconds, r.median, r.largest) for r in points]
         median_and_largest(right, f"C{k}", errors)
     left.set(xlabel=r"packing fraction $\phi$", ylabel="pressure $p$")
-    right.set(xlabel="processor time (s)", ylabel="relative error of p")
+    right.set(xlabel="CPU time (s)", ylabel="relative error of p")
     left.legend(fontsize=8)
     name_median_and_largest(right)
     save_figure(figure, options.out / name)

@@ -134,13 +134,18 @@ def figure_from(found: Averages, title: str) -> Figure:
 
 
 def draw_density(axes: Axes, found: Averages, spheres: float, ours: dict[str, Any]) -> None:
-    """Draw phi_J and the random contact law of thin rods."""
+    """Draw phi_J and the random contact law of long rods."""
     error_bars(axes, found["phi_J"], spheres, **ours)
     error_bars(axes, MAXIMUM, None, **PUBLISHED)
-    law = [(a, z.value / (2 * a)) for a, z in sorted(found["z"].items()) if a >= THIN]
-    label = r"random contacts of thin rods, $z_J/2\alpha$"
+    law = [(a, z.value / excluded(a)) for a, z in sorted(found["z"].items()) if a >= THIN]
+    label = r"random contacts, $z_J V/V_\mathrm{ex}$"
     axes.plot(*np.reshape(law, (-1, 2)).T, label=label, **PAPER_LINE)
     axes.set_ylabel(r"packing fraction $\phi_J$")
+
+
+def excluded(alpha: float) -> float:
+    """Return the volume that two rods of random directions exclude, over that of one (Onsager 1949)."""
+    return (2 * np.pi * alpha**2 + 8 * np.pi * alpha + 16 * np.pi / 3) / (np.pi * alpha + 2 * np.pi / 3)
 
 
 def draw_contacts(axes: Axes, found: Averages, spheres: float, ours: dict[str, Any]) -> None:

@@ -32,7 +32,7 @@ from common.contact_classes import class_stress
 from common.styles import color
 
 CLASSES = ("tip-to-tip", "tip-to-side", "side-to-side")
-PARTS = {"pressure": "part of the pressure", "shear_stress": "part of the shear stress"}
+PARTS = {"pressure": "fraction of the pressure", "shear_stress": "fraction of the shear stress"}
 
 
 class Parts(NamedTuple):
