@@ -145,7 +145,9 @@ def draw_density(axes: Axes, found: Averages, spheres: float, ours: dict[str, An
 
 def excluded(alpha: float) -> float:
     """Return the volume that two rods of random directions exclude, over that of one (Onsager 1949)."""
-    return (2 * np.pi * alpha**2 + 8 * np.pi * alpha + 16 * np.pi / 3) / (np.pi * alpha + 2 * np.pi / 3)
+    return (2 * np.pi * alpha**2 + 8 * np.pi * alpha + 16 * np.pi / 3) / (
+        np.pi * alpha + 2 * np.pi / 3
+    )
 
 
 def draw_contacts(axes: Axes, found: Averages, spheres: float, ours: dict[str, Any]) -> None:

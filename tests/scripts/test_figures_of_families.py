@@ -96,6 +96,8 @@ def test_figures_from_a_table_are_those_from_its_packings(report, series, made, 
 def flat(systems):
     """Numbers of each system, its pressures and its fits, without averages over directions, which tables do not have."""
     rows = [row for of in systems for row in (of, *of["points"])]
-    fits = [fit for of in systems for name, fit in of.get("fits", {}).items() if name != "directions"]
+    fits = [
+        fit for of in systems for name, fit in of.get("fits", {}).items() if name != "directions"
+    ]
     keep = [{k: x for k, x in row.items() if "directions" not in k} for row in (*rows, *fits)]
     return [{k: x for k, x in row.items() if isinstance(x, int | float)} for row in keep]

@@ -215,7 +215,7 @@ def recipe_for(
     if source is not None:
         source.require(particles, n=given.get("n"), dimension=dimension, seed=seed)
         particles, dimension, seed = source.particles, source.dimension, source.seed
-    particles, dimension = _placed(particles, dimension)
+    particles, dimension = of = _placed(particles, dimension)
     name = "quasistatic" if protocol is None else protocol_named(protocol)
     require_one_of("protocol", name, PROTOCOLS)
     usual = PROTOCOLS[name]
@@ -225,12 +225,9 @@ def recipe_for(
     if aim is not None:
         get |= {"u0": aim.u0 or _of_law(get, _IN_BETWEEN), "accuracy": aim.accuracy}
     require_with("u0", get["u0"] or None, accuracy=given.get("accuracy"))
-    get |= {} if source is None else _of_source(source, given)
+    get |= _of_source(source, given) if source else _at_random(get, given, seed, of)
     how, target = usual.compose(get)
-    sizes = get["n"], 1 if seed is None else seed, particles, dimension
-    if source is None and given.get("phi_start") is None:
-        get["phi_start"] = usual_phi_start(get["phi_start"], *sizes)
-    numbers = (get["n"], dimension, sizes[1], get["phi_start"])
+    numbers = (get["n"], dimension, get["seed"], get["phi_start"])
     return Recipe(particles, *numbers, how, aim or target, strict=strict, stable_to_shear=stable)
 
 
@@ -306,11 +303,21 @@ def _allowed(
     return kept
 
 
+def _at_random(
+    get: Values, given: dict[str, Any], seed: int | None, of: tuple[Particles, int]
+) -> dict[str, Any]:
+    """Return a seed, and a packing fraction at which particles of this dimension have room if none was typed."""
+    seed = 1 if seed is None else seed
+    if given.get("phi_start") is not None:
+        return {"seed": seed}
+    return {"seed": seed, "phi_start": usual_phi_start(get["phi_start"], get["n"], seed, *of)}
+
+
 def _of_source(source: Source, given: dict[str, Any]) -> dict[str, Any]:
     """Take settings from a start, and refuse those that would have no effect beside it."""
     for name in ("phi_start", "phi_end", "kappa"):
         if given.get(name) is not None:
             said = f"{{{name}}} has no effect on a start that is already compressed; leave it out"
             raise ArgumentError(said, {name: given[name]})
-    own = {name: getattr(source, name) for name in ("n", "phi_start", "phi_end", "kappa")}
+    own = {name: getattr(source, name) for name in ("n", "seed", "phi_start", "phi_end", "kappa")}
     return own | {"start": source.path}

@@ -16,7 +16,12 @@ from jamshape.files.lammps_text import read_data
 from jamshape.landscape import Landscape, State
 from jamshape.measures.order import orientational_order
 from jamshape.minima import Outcome, Stop, minimise
-from jamshape.protocols.random_start import InsertionError, dilute_packing, random_packing, usual_phi_start
+from jamshape.protocols.random_start import (
+    InsertionError,
+    dilute_packing,
+    random_packing,
+    usual_phi_start,
+)
 from jamshape.shapes.particles import Particles, Sizes
 from jamshape.shapes.table import shape_named
 
