@@ -343,7 +343,10 @@ def _stressed(landscape: Landscape, run: Sheared, how: QuasistaticShear) -> tupl
     try:
         while not at.done:
             settle(landscape, at, goal)
-    except FlowError:
+    except FlowError as error:
+        if run.steps < 0:
+            msg = f"before the first step of the stress {error}; take a larger strain or another start"
+            raise FlowError(msg) from error
         run.flows = True
         return minimise(landscape, at.state, "auto", Stop(how.tolerance)), at.sheared
     assert at.present is not None

@@ -569,7 +569,9 @@ class QuasistaticShearFile(Recorded):
         return YieldStress((len(self["stress"]) - 1.5) * step, 0.5 * step)
 
     def modulus(self) -> float:
-        """Slope of the stress in the first step, [energy / length^D]; that of the Hessian for small steps."""
+        """Slope of the stress in the first step, [energy / length^D]; that of the Hessian for small steps, NaN without a step."""
+        if len(self.strain) < 2 or self.strain[1] == self.strain[0]:
+            return math.nan
         return float((self.stress[1] - self.stress[0]) / (self.strain[1] - self.strain[0]))
 
     @checked

@@ -362,6 +362,9 @@ def _judge(landscape: Landscape, at: Settling, goal: Yielding) -> None:
     if not _has_volume(landscape, present.state, goal):
         return
     if present.outcome is Outcome.UNJAMMED:
+        if goal.keeps_volume and goal.shear:
+            msg = f"the packing unjammed at a strain of {at.sheared:.3g}, expected one that resists a stress of {goal.shear:g}"
+            raise FlowError(msg)
         at.done, at.stress_error = goal.keeps_volume, 0.0
         return
     tensor = landscape.stress(present.state)

@@ -10,6 +10,7 @@ import jamshape as js
 from jamshape.checks import ArgumentError, TimeLimitError
 from jamshape.flow.quasistatic import QuasistaticShear, Sheared, shear
 from jamshape.landscape import Landscape, State
+from jamshape.minima.boxes import FlowError
 from jamshape.vibration.elasticity import moduli
 from jamshape.vibration.hessian import dynamical_matrix
 
@@ -97,6 +98,24 @@ def test_the_strain_of_a_small_stress_follows_from_the_modulus():
     rows = list(islice(shear(Landscape(start), Sheared(State.of(start)), how), 2))
     modulus = moduli(dynamical_matrix(Landscape(start), State.of(start))).simple_shear.relaxed
     assert (rows[1].strain - rows[0].strain) * modulus / step == pytest.approx(1, rel=1e-2)
+
+
+def test_a_packing_that_unjams_at_constant_volume_resists_no_stress(tmp_path):
+    """Its box would shear without an end at no stress."""
+    start = js.make_packing(js.Spherocylinders(alpha=0), n=16, seed=2, u0=1e-6, progress=False)
+    run = js.quasistatic_shear(
+        start=start, stress_step=1e-4, file=tmp_path / "run.h5", progress=False
+    )
+    assert len(run.stress) == 2
+    assert run["u"][-1] < 1e-20
+    assert run.yield_stress == pytest.approx((5e-5, 5e-5))
+
+
+def test_a_start_that_does_not_relax_to_no_stress_is_refused():
+    start = packing()
+    off = js.quasistatic_shear(start=start, step=1e-3, strain=5e-3, progress=False).packing()
+    with pytest.raises(FlowError, match="before the first step of the stress the box sheared by"):
+        js.quasistatic_shear(start=off, stress_step=1e-4, strain=1e-4, progress=False)
 
 
 def test_it_resumes_with_the_same_bits(tmp_path):
