@@ -226,24 +226,8 @@ void BoxControl::aim()
 /// Volume times the stress of the contacts, xx to yz: P_ab is conjugate to the shear of a along b.
 std::array<double, 6> BoxControl::stress_times_volume() const
 {
-  std::array<double, 6> mine{}, all{};
-  std::copy_n(pair->virial, 6, mine.begin());
-  // LAMMPS's virial is r_k f_l with k < l; the torques are the difference to r_l f_k.
-  Vec<3> torque{};
-  if (compat::has_post_force(modify)) {  // which may have changed the torques
-    pair->for_each_bond([&](const LocalBond &b) {
-      const double share = force->newton_pair || b.j < atom->nlocal ? 1.0 : 0.5;
-      torque += share * cross(b.arm_i - b.arm_j, b.force);
-    });
-  } else {
-    for (int i = 0; i < atom->nlocal; ++i) {
-      for (int k = 0; k < 3; ++k) torque[k] += atom->torque[i][k];
-    }
-  }
-  mine[3] += torque[2];
-  mine[4] -= torque[1];
-  mine[5] += torque[0];
-  MPI_Allreduce(mine.data(), all.data(), 6, MPI_DOUBLE, MPI_SUM, world);
+  std::array<double, 6> all{};
+  MPI_Allreduce(pair->virial, all.data(), 6, MPI_DOUBLE, MPI_SUM, world);
   return all;
 }
 

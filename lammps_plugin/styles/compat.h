@@ -104,10 +104,6 @@ auto forward(Comm *comm, Fix *fix, int n) -> decltype(comm->forward_comm_fix(fix
 /// Number of regions defined by the deck: a public counter until 2022.
 JAMSHAPE_EITHER(n_regions, of->get_region_list().size(), of->nregion)
 
-/// Whether any fix changes forces: the count was public until 2021; later there is a flag beside
-/// it.
-JAMSHAPE_EITHER(has_post_force, of->n_post_force_any != 0, of->n_post_force != 0)
-
 /// The fixes and computes of LAMMPS's Modify: public arrays until 2026.
 JAMSHAPE_EITHER(fixes, std::vector(of->get_fix_list()), std::vector(of->fix, of->fix + of->nfix))
 JAMSHAPE_EITHER(computes, std::vector(of->get_compute_list()),

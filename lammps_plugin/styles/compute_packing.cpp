@@ -140,44 +140,24 @@ void ComputePacking::compute_vector()
   }
   pair = &PairContact::evaluated(lmp, "compute packing");
   const std::vector<LocalBond> bonds = pair->reported_bonds();
-  compute_density_and_stress(bonds);
+  compute_density_and_stress();
   compute_order();
   compute_cubatic_order();
   compute_contacts(bonds);
 }
 
 /// The sum of all contact torques on this rank's particles, or of this rank's contacts.
-Vec<3> ComputePacking::torque_of_contacts(const std::vector<LocalBond> &bonds) const
-{
-  Vec<3> torque{};
-  if (compat::has_post_force(modify)) {  // such as freeze, which changes the torques of particles
-    for (const LocalBond &bond : bonds) torque += cross(bond.arm_i - bond.arm_j, bond.force);
-    return torque;
-  }
-  for (int i = 0; i < atom->nlocal; ++i) {
-    for (int k = 0; k < 3; ++k) torque[k] += atom->torque[i][k];
-  }
-  return torque;
-}
-
-void ComputePacking::compute_density_and_stress(const std::vector<LocalBond> &bonds)
+void ComputePacking::compute_density_and_stress()
 {
   const int d = domain->dimension;
-  double volume = 1.0, measure = 0.0, trace = 0.0, mine[6], sums[6];
+  double volume = 1.0, measure = 0.0, trace = 0.0, sums[6];
   for (int k = 0; k < d; ++k) volume *= domain->prd[k];
   for (int i = 0; i < atom->nlocal; ++i) {
     measure += pair->drag(pair->particle_view().semi_axes(i), atom->type[i]).measure;
   }
-  const Vec<3> torque = torque_of_contacts(bonds);
   vector[PHI] = sum(measure) / volume;
   vector[U] = sum(pair->eng_vdwl) / volume;
-  // LAMMPS's virial is xx, yy, zz, xy, xz, yz of r_k f_l. The stress conjugate to shear of x along
-  // y is r_y f_x: the loads of a contact balance, so that it differs by the torques.
-  std::copy_n(pair->virial, 6, mine);
-  mine[3] += torque[2];
-  mine[4] -= torque[1];
-  mine[5] += torque[0];
-  MPI_Allreduce(mine, sums, 6, MPI_DOUBLE, MPI_SUM, world);
+  MPI_Allreduce(pair->virial, sums, 6, MPI_DOUBLE, MPI_SUM, world);
   for (double &component : sums) component *= force->nktv2p;  // 1 with `units lj`
   for (int k = 0; k < d; ++k) trace += sums[k];
   vector[P] = trace / (d * volume);

@@ -49,8 +49,7 @@ class ComputePacking : public LAMMPS_NS::Compute {
 
   double sum(double mine) const;
   double largest(double mine) const;
-  Vec<3> torque_of_contacts(const std::vector<LocalBond> &bonds) const;
-  void compute_density_and_stress(const std::vector<LocalBond> &bonds);
+  void compute_density_and_stress();
   void compute_order();
   void compute_cubatic_order();
   void compute_contacts(const std::vector<LocalBond> &bonds);

@@ -26,14 +26,14 @@ struct Registry {  // as LAMMPS has one for each kind of style since the summer 
 
 struct Old {  // a table of each instance, public arrays
   Table table, *pair_map = &table, *fix_map = &table;
-  int one = 1, two = 2, nfix = 2, ncompute = 1, nregion = 3, n_post_force = 0;
+  int one = 1, two = 2, nfix = 2, ncompute = 1, nregion = 3;
   int *each[2] = {&one, &two}, **fix = each, **compute = each;
   int request(Old *, int instance) { return nregion = instance; }
 };
 struct New {  // no tables, protected arrays
   static Registry &pair_styles() { static Registry all; return all; }
   static Registry &fix_styles() { return pair_styles(); }
-  int one = 1, two = 2, n_post_force_any = 1, requests = 0;
+  int one = 1, two = 2, requests = 0;
   std::vector<int *> list{&two, &one, &two};
   const std::vector<int *> &get_fix_list() { return list; }
   const std::vector<int *> &get_compute_list() { return list; }
@@ -41,7 +41,7 @@ struct New {  // no tables, protected arrays
   void add_request(New *) { ++requests; }
 
  protected:
-  int nfix = 0, ncompute = 0, n_post_force = 0;
+  int nfix = 0, ncompute = 0;
   int **fix = nullptr, **compute = nullptr;
   int request(New *, int) { return 0; }
 };
@@ -59,8 +59,7 @@ template <class Version> void tell()
   compat::add_style(compat::fix_styles(&lammps), "ours", [] { return 7; });
   std::printf("%d:", static_cast<int>(compat::n_regions(&lammps)));
   for (const int *fix : compat::fixes(&lammps)) std::printf(" %d", *fix);
-  std::printf(", %d computes, forces %d,", static_cast<int>(compat::computes(&lammps).size()),
-              compat::has_post_force(&lammps));
+  std::printf(", %d computes,", static_cast<int>(compat::computes(&lammps).size()));
 }
 
 int main()
@@ -99,7 +98,7 @@ def test_what_a_version_has_is_taken(tmp_path):
     assert built.returncode == 0, built.stderr[-3000:]
     told = subprocess.run([tmp_path / "told"], text=True, capture_output=True, check=True).stdout
     assert told.splitlines() == [
-        "3: 1 2, 1 computes, forces 0, 6 7",
-        "3: 2 1 2, 3 computes, forces 1, 1 7",
-        "3: 2 1 2, 3 computes, forces 1,",
+        "3: 1 2, 1 computes, 6 7",
+        "3: 2 1 2, 3 computes, 1 7",
+        "3: 2 1 2, 3 computes,",
     ]
