@@ -199,6 +199,9 @@ def test_pressure_ends_a_compression(tmp_path):
 def test_a_deck_takes_data_of_ones_own(tmp_path):
     packing = random_packing(16, 0.3, 4, Particles.of(alpha=1))
     write_data(tmp_path / "own.data", packing)
+    coefficients = "\nPair Coeffs # spherocylinder/harmonic\n\n1 9\n2 9\n"
+    with (tmp_path / "own.data").open("a") as file:
+        file.write(coefficients)  # as `write_data` of LAMMPS does
     run_deck(RODS, tmp_path, data="own.data", kappa=1e-2, phi_end=0.5)
     first = dump_of(RODS, tmp_path / "compress.dump")[0]
     np.testing.assert_array_equal(first.position, packing.position)
@@ -415,7 +418,7 @@ def test_the_deck_of_the_page_runs_word_for_word(ranks, clone, tmp_path):
 CASES = [
     (RODS, {"kappa": 0}, "Divide by 0"),
     (RODS, {"kappa": "nan"}, "nan"),
-    (RODS, {"dt": "-0.1"}, "time ?step|thermo"),
+    (RODS, {"dt": "-0.1"}, "steps to the end, expected one or more"),
     (RODS, {"alpha": "4;touch X"}, r"Illegal variable|Invalid syntax in variable"),
     (RODS, {"alpha": "$(touch X)"}, "Invalid|variable|formula"),
     (RODS, {"alpha": -1}, r"expected diameters of its shape \(a spherocylinder"),
@@ -424,6 +427,8 @@ CASES = [
     (RODS, {"sides": "three"}, "three.*expected"),
     (RODS, {"phi_start": 0.8}, r"expected a PHI with room for random insertion, which stalled at"),
     (RODS, {"data": "none"}, "Cannot open file none"),
+    (RODS, {"kappa": -1e-3}, "steps to the end, expected one or more; choose positive rates"),
+    ("shear_spherocylinder", {"gdot": -1e-3}, "steps to the end, expected one or more"),
     (BODIES, {"p": 0.5}, "expected 'form' with a finite number above 0.5"),
     (BODIES, {"w1": "`touch X`"}, r"Illegal variable|Invalid syntax in variable"),
     ("minimize_spherocylinder", {}, "Found no state to minimise, expected -var restart FILE or -var data FILE"),
