@@ -200,8 +200,8 @@ def test_a_deck_takes_data_of_ones_own(tmp_path):
     packing = random_packing(16, 0.3, 4, Particles.of(alpha=1))
     write_data(tmp_path / "own.data", packing)
     coefficients = "\nPair Coeffs # spherocylinder/harmonic\n\n1 9\n2 9\n"
-    with (tmp_path / "own.data").open("a") as file:
-        file.write(coefficients)  # as `write_data` of LAMMPS does
+    path = tmp_path / "own.data"  # as `write_data` of LAMMPS leaves it
+    path.write_text(path.read_text().replace("\nAtoms", f"{coefficients}\nAtoms"))
     run_deck(RODS, tmp_path, data="own.data", kappa=1e-2, phi_end=0.5)
     first = dump_of(RODS, tmp_path / "compress.dump")[0]
     np.testing.assert_array_equal(first.position, packing.position)
