@@ -109,10 +109,10 @@ def forget_if_gone(name, packings):
         said.unlink()
 
 
-def add_modes(group, of, files):
+def add_modes(group, of, files, options=""):
     """Add the modes of the packings of a sweep, a job for each of its jobs."""
     for name, paths in files.items():
-        add(group, f"{group}_{name}", modes_of(shlex.join(paths), group), after=[of])
+        add(group, f"{group}_{name}", modes_of(shlex.join(paths), group, options), after=[of])
 
 
 def figure(name, script, inputs, after, *, draws=None):
