@@ -6,6 +6,8 @@
 
 #include "comm.h"
 #include "error.h"
+#include "force.h"
+#include "lammps.h"
 #include "update.h"
 
 #include <cstdio>
@@ -13,8 +15,11 @@
 #include <dlfcn.h>
 #include <exception>
 #include <string>
+#include <utility>
 
 namespace {
+
+using LAMMPS_NS::Pointers;
 
 struct Refusal {
   std::string sentence;
@@ -28,11 +33,16 @@ constexpr char ALL[] =
 constexpr char ONE[] =
     "_ZN9LAMMPS_NS5Error3oneERKNSt7__cxx1112basic_stringIcSt11char_traitsIcESaIcEEEiS8_";
 
+constexpr char CREATE_INTEGRATE[] = "_ZN9LAMMPS_NS6Update16create_integrateEiPPci";
+constexpr char CREATE_MINIMIZE[] = "_ZN9LAMMPS_NS6Update15create_minimizeEiPPci";
+constexpr char CREATE_KSPACE[] =
+    "_ZN9LAMMPS_NS5Force13create_kspaceERKNSt7__cxx1112basic_stringIcSt11char_traitsIcESaIcEEEi";
+
 /// A function of LAMMPS's library, located through the virtual table of one of its objects.
-void *of_lammps(const LAMMPS_NS::Error *object, const char *name)
+void *of_lammps(const void *object, const char *name)
 {
   Dl_info found;
-  if (!dladdr(*reinterpret_cast<void *const *>(object), &found)) return nullptr;
+  if (!dladdr(*static_cast<void *const *>(object), &found)) return nullptr;
   void *const library = dlopen(found.dli_fname, RTLD_NOLOAD | RTLD_LAZY);
   return library ? dlsym(library, name) : nullptr;
 }
@@ -45,6 +55,41 @@ void *of_lammps(const LAMMPS_NS::Error *object, const char *name)
     stop(error, file, line, sentence);
   std::fprintf(stderr, "ERROR: %s\n", sentence.c_str());
   std::abort();
+}
+
+/// Calls the function of LAMMPS that replaces a style, without the old one, which it would delete
+/// first and still point to after an error.
+template <class Function, class Owner, class Style, class... Arguments>
+void replace(const char *function, Owner *owner, Style *&style, char *&name,
+             Arguments &&...arguments)
+{
+  const auto make = reinterpret_cast<Function>(of_lammps(owner, function));
+  Style *const old_style = std::exchange(style, nullptr);
+  char *const old_name = std::exchange(name, nullptr);
+  try {
+    make(owner, std::forward<Arguments>(arguments)...);
+  } catch (...) {
+    style = old_style;
+    name = old_name;
+    throw;
+  }
+  delete reinterpret_cast<Pointers *>(old_style);  // the base of all styles
+  delete[] old_name;
+}
+
+using CreateByWords = void (*)(LAMMPS_NS::Update *, int, char **, int);
+using CreateByName = void (*)(LAMMPS_NS::Force *, const std::string &, int);
+
+/// The sentence for an exception that is not LAMMPS's own, after which the next command may begin
+/// a run or minimisation.
+const char *after(const std::exception &error, LAMMPS_NS::LAMMPS *lammps)
+{
+  lammps->update->whichflag = 0;
+  // LAMMPS reads the name of a pair style that it has deleted.
+  if (lammps->force->pair_style == nullptr)
+    return "LAMMPS found no pair style, since it refused the last one, expected one; give "
+           "pair_style and pair_coeff";
+  return error.what();
 }
 
 }  // namespace
@@ -63,6 +108,21 @@ void Error::one(const std::string &file, int line, const std::string &sentence)
 {
   if (!is_within || comm->nprocs > 1) leave_to_lammps(ONE, this, file, line, sentence);
   all(file, line, sentence);
+}
+
+void Update::create_integrate(int narg, char **arg, int try_suffix)
+{
+  replace<CreateByWords>(CREATE_INTEGRATE, this, integrate, integrate_style, narg, arg, try_suffix);
+}
+
+void Update::create_minimize(int narg, char **arg, int try_suffix)
+{
+  replace<CreateByWords>(CREATE_MINIMIZE, this, minimize, minimize_style, narg, arg, try_suffix);
+}
+
+void Force::create_kspace(const std::string &style, int try_suffix)
+{
+  replace<CreateByName>(CREATE_KSPACE, this, kspace, kspace_style, style, try_suffix);
 }
 
 }  // namespace LAMMPS_NS
@@ -95,7 +155,7 @@ int jamshape_command(char *(*lammps_command)(void *, const char *), void *lammps
   } catch (const Refusal &refusal) {
     return refused(refusal.sentence.c_str());
   } catch (const std::exception &error) {  // such as std::bad_alloc
-    return refused(error.what());
+    return refused(after(error, static_cast<LAMMPS_NS::LAMMPS *>(lammps)));
   }
   is_within = false;
   return 0;

@@ -13,6 +13,7 @@
 #include "fix_overdamped_affine.h"
 #include "force.h"
 #include "input.h"
+#include "mending.h"
 #include "modify.h"
 #include "pair_contact.h"
 #include "utils.h"
@@ -246,6 +247,17 @@ void jamshape_register(void *handle)
   if (!wrong.empty()) lmp->error->all(FLERR, wrong);
   add_styles(lmp, AddToStyles{lmp});
 }
+
+/// Adds the styles again if `clear` has removed them; returns whether it has.
+int jamshape_register_again(void *handle)
+{
+  if (lammps_has_style(handle, "fix", "overdamped/affine")) return 0;
+  jamshape_register(handle);
+  return 1;
+}
+
+/// Makes a LAMMPS usable after an error in a command.
+void jamshape_mend(void *handle) { jamshape::mend(static_cast<LAMMPS *>(handle)); }
 
 /// Entry point of `plugin load` and LAMMPS_PLUGIN_PATH. Another LAMMPS only gets a warning: one
 /// that finds plugins by itself must be able to continue without.
