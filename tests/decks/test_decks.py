@@ -389,6 +389,14 @@ def test_no_plugin_is_one_sentence_of_all_ranks(ranks, tmp_path):
     )
 
 
+def test_a_cleared_deck_without_the_folder_finds_no_plugin(installed, tmp_path):
+    shutil.copytree(INPUTS, tmp_path / "inputs")
+    lines = loader_lines(installed)
+    cleared = ["clear", "variable jamshape delete", "include inputs/load_plugin.lmp"]
+    [sentence] = own_deck(tmp_path, [*lines, *cleared])
+    assert sentence.startswith("ERROR: Found no jamshape_plugin.so in ., expected the folder")
+
+
 def test_what_is_no_plugin_is_refused(installed, tmp_path):
     text = tmp_path / "text.so"
     text.write_text("text")
