@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from jamshape.arrays import IntArray
 from jamshape.files.lammps_text import packing_of_columns
 from jamshape.files.meaning import Wanted
-from jamshape.lammps.module import one_at_a_time, run_command
+from jamshape.lammps.module import info, one_at_a_time, require_open, run_command
 from jamshape.lammps.plugin import PluginError, built_for, plugin_path
 from jamshape.packing import Packing
 
@@ -94,7 +94,7 @@ def write_living(packing: Packing, living: Living) -> None:
 def _instance(living: Living) -> Any:
     """Return the object ``lammps.lammps`` of one process, with ellipsoids."""
     lmp: Any = living if hasattr(living, "extract_box") else living.lmp
-    processes = lmp.extract_setting("world_size")
+    processes = require_open(lmp).extract_setting("world_size")
     if processes > 1:
         msg = (
             f"{NAME} has {processes} processes, expected one: write a data file in LAMMPS (write_data) and load that, or"
@@ -178,11 +178,9 @@ def _pair(lmp: Any) -> str:
 
 def _warn_of_fixes(lmp: Any) -> None:
     """Warn of fixes that act on particles in other ways than contacts between them."""
-    with open(os.memfd_create("fixes"), "w+b") as file:  # noqa: PTH123 - a descriptor
-        run_command(lmp, f"info fixes out overwrite /dev/fd/{file.fileno()}")
-        file.seek(0)
-        lines = file.read().decode(errors="replace").splitlines()
-    styles = [line.partition("style = ")[2].partition(",")[0].strip() for line in lines]
+    styles = [
+        line.partition("style = ")[2].partition(",")[0].strip() for line in info(lmp, "fixes")
+    ]
     found = sorted({style for style in styles if style.startswith(_HOLDING)})
     if found:
         said = (

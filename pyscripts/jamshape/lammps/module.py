@@ -20,6 +20,8 @@ from jamshape.lammps.plugin import PluginError, errors_path
 # Prefixes that LAMMPS adds to the message of an error.
 _AROUND = ("ERROR: ", "ERROR on proc 0: ")
 
+_TRIPLE = '"' * 3
+
 # Buffer for an error message, in bytes.
 _ROOM = 4096
 
@@ -148,14 +150,52 @@ def load_errors() -> Any:
     return None if path is None else ctypes.CDLL(str(path), mode=os.RTLD_GLOBAL | os.RTLD_NOW)
 
 
+def require_open(lmp: Any, name: str = "LAMMPS instance", new: str = "LAMMPS instance") -> Any:
+    """Return an instance of LAMMPS that is not closed: the functions of a closed one end the process.
+
+    Raises
+    ------
+    ValueError
+        If it is closed.
+    """
+    if lmp.lmp is None:
+        msg = f"the {name} is closed, expected an open one; make a new {new}"
+        raise ValueError(msg)
+    return lmp
+
+
+def separate_commands(text: str) -> list[str]:
+    r"""Split LAMMPS input into commands, which a final `&` and triple quotes continue on the next line, as in a deck.
+
+    Examples
+    --------
+    >>> separate_commands("units lj\nrun &\n  10")
+    ['units lj', 'run   10']
+    """
+    commands, begun = [], ""
+    for line in text.strip().splitlines():
+        begun += line
+        if begun.rstrip().endswith("&"):
+            begun = begun.rstrip()[:-1]
+        elif begun.count(_TRIPLE) % 2:
+            begun += "\n"
+        else:
+            commands.append(begun.strip())
+            begun = ""
+    return [*commands, begun.strip()] if begun.strip() else commands
+
+
 def run_command(lmp: Any, line: str) -> None:
-    """Run a line of LAMMPS input.
+    """Run one command of LAMMPS input.
 
     Raises
     ------
     LammpsError
         If LAMMPS, or one of our styles, refuses it.
+    ValueError
+        If the instance is closed.
     """
+    require_open(lmp)
     errors = None if lmp.has_exceptions else load_errors()
     if errors is None:
         try:
@@ -167,6 +207,14 @@ def run_command(lmp: Any, line: str) -> None:
     room = ctypes.c_size_t(_ROOM)
     if errors.jamshape_command(lmp.lib.lammps_command, lmp.lmp, line.encode(), sentence, room):
         raise LammpsError(sentence_of(Exception(sentence.value.decode(errors="replace"))))
+
+
+def info(lmp: Any, kind: str) -> list[str]:
+    """Return the lines of LAMMPS's command `info`, about a kind of objects such as ``"fixes"``."""
+    with open(os.memfd_create("info"), "w+b") as file:  # noqa: PTH123 - a descriptor
+        run_command(lmp, f"info {kind} out overwrite /dev/fd/{file.fileno()}")
+        file.seek(0)
+        return file.read().decode(errors="replace").splitlines()
 
 
 def sentence_of(error: Exception) -> str:

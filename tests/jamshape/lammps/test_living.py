@@ -122,7 +122,7 @@ def test_other_particles_are_refused():
 class TwoRanks:
     """An instance of two processes, as far as it is asked."""
 
-    lmp = None
+    lmp = 1
 
     def extract_box(self):
         raise AssertionError
