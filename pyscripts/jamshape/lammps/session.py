@@ -14,9 +14,19 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NoReturn, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from jamshape.arguments import checked
 from jamshape.checks import require_one_process
 from jamshape.files.lammps_text import write_data
-from jamshape.lammps.module import lammps_class, one_at_a_time, run_command, start_lammps
+from jamshape.lammps.module import (
+    LammpsError,
+    info,
+    lammps_class,
+    one_at_a_time,
+    require_open,
+    run_command,
+    separate_commands,
+    start_lammps,
+)
 from jamshape.lammps.plugin import PluginError, built_for, plugin_path
 from jamshape.packing import Box, Packing, angle_from_quaternion
 from jamshape.shapes.shape import Interaction
@@ -35,6 +45,10 @@ _POSES = """compute orient all property/atom quatw quati quatj quatk
 # Skin, over the smallest diameter.
 _SKIN = 0.3
 _WIDEST_BIN = 50.0
+
+
+# A line of `info dumps`.
+_DUMP = re.compile(r"Dump\[ *\d+\]: +(\S+), +file = (.*), +style = ")
 
 
 # Variables by which Open MPI detects a process started by srun.
@@ -66,6 +80,25 @@ def _as_one_process() -> Iterator[None]:
 def _in_memory() -> BinaryIO:
     """Open a file without a name, for LAMMPS to read or write through its descriptor."""
     return open(os.memfd_create("restart"), "w+b")  # noqa: PTH123 - a descriptor
+
+
+def _without_dumps(lmp: Any) -> LammpsError:
+    """Remove dumps whose file cannot be opened, which LAMMPS would crash on writing; return an error that names them."""
+    dumps = dict(_DUMP.findall("\n".join(info(lmp, "dumps"))))
+    unwritable = {name: file for name, file in dumps.items() if not _is_writable(Path(file))}
+    removed = unwritable or dumps
+    for name in removed:
+        run_command(lmp, f"undump {name}")
+    named = ", ".join(f"{name} ({file})" for name, file in removed.items())
+    return LammpsError(
+        f"found a dump whose file cannot be opened, expected a path that can be written; removed {named}: repeat the command"
+        " dump with another path"
+    )
+
+
+def _is_writable(path: Path) -> bool:
+    """Return whether a file can be opened for writing."""
+    return not path.is_dir() and os.access(path if path.exists() else path.parent, os.W_OK)
 
 
 class Session:
@@ -130,7 +163,7 @@ class Session:
             options += ["-screen", f"/dev/fd/{self._complaints.stdin.fileno()}"]
         try:
             with one_at_a_time(), _as_one_process():
-                self.lmp: Any = start_lammps([*options, *arguments])
+                self._lmp = start_lammps([*options, *arguments])
         except BaseException:
             self._end_complaints()
             raise
@@ -150,7 +183,7 @@ class Session:
     def close(self) -> None:
         """End the instance."""
         with one_at_a_time():
-            self.lmp.close()
+            self._lmp.close()
         self._end_complaints()
 
     def _end_complaints(self) -> None:
@@ -164,7 +197,8 @@ class Session:
         except PluginError:
             self.close()
             raise
-        library.jamshape_register.argtypes = [ctypes.c_void_p]
+        for name in ("register", "register_again", "mend"):
+            getattr(library, f"jamshape_{name}").argtypes = [ctypes.c_void_p]
         library.jamshape_register(self.lmp.lmp)
         return library
 
@@ -186,17 +220,40 @@ class Session:
             raise PluginError(wrong)
         return library
 
+    @property
+    def lmp(self) -> Any:
+        """The object ``lammps.lammps``; a ValueError if the session is closed."""
+        return require_open(self._lmp, "session", "js.Session()")
+
+    @checked
     def commands(self, text: str) -> None:
-        """Run LAMMPS input, one command a line.
+        """Run LAMMPS input, one command a line; a final ``&`` and triple quotes continue it on the next line.
 
         Raises
         ------
         LammpsError
-            If LAMMPS refuses one.
+            If LAMMPS refuses one. The session remains usable, without the pair style or fix that the command would have
+            replaced, with the default thermo style, and without dumps whose file cannot be opened.
+        ValueError
+            If the session is closed.
         """
-        for line in text.strip().splitlines():
+        for command in separate_commands(text):
             with one_at_a_time():
-                run_command(self.lmp, line.strip())
+                self._run(command)
+
+    def _run(self, command: str) -> None:
+        lmp = self.lmp
+        try:
+            run_command(lmp, command)
+        except LammpsError as error:
+            self._library.jamshape_mend(lmp.lmp)
+            if "annot open dump file" in str(error):
+                raise _without_dumps(lmp) from error
+            raise
+        finally:
+            # After `clear`, which may also come within a deck.
+            if self._library.jamshape_register_again(lmp.lmp):
+                self._like = self._law = None
 
     def left_out(self) -> str:
         """Return the log's note on calculations skipped in the last run."""
@@ -204,8 +261,16 @@ class Session:
         function.argtypes, function.restype = [ctypes.c_void_p], ctypes.c_char_p
         return str(function(self.lmp.lmp).decode())
 
+    @checked
     def load(self, packing: Packing) -> None:
-        """Load a packing into a fresh instance; LAMMPS types are those of `Shape.style`, its IDs 1 to N."""
+        """Load a packing into a fresh instance; LAMMPS types are those of `Shape.style`, its IDs 1 to N.
+
+        Raises
+        ------
+        ValueError
+            If the instance has a simulation box already.
+        """
+        self._require_no_box()
         self.commands(f"{_ATOMS}\ndimension {packing.dimension}")
         self._like = packing
         one = packing.with_(law=Interaction())  # set by `interact`
@@ -221,8 +286,17 @@ class Session:
                 self.commands(f"read_data /dev/fd/{file.fileno()}")
         self.commands(_POSES)
 
+    def _require_no_box(self) -> None:
+        if self.lmp.extract_setting("box_exist"):
+            msg = (
+                "the session has a simulation box already, expected none; run commands('clear') first, or set another state of"
+                " the same particles with packing.to_lammps(session)"
+            )
+            raise ValueError(msg)
+
     def load_restart(self, restart: bytes, like: Packing | None = None) -> None:
         """Load the content of a restart file into a fresh instance, with the particles of a packing."""
+        self._require_no_box()
         self._like = like
         with _in_memory() as file:
             file.write(restart)
@@ -237,10 +311,11 @@ class Session:
             file.seek(0)
             return file.read()
 
+    @checked
     def interact(self, law: Interaction) -> None:
         """Set the pair style of the loaded particles; packings carry this law from then on."""
-        self._law = law
         self.commands(self._loaded.shape.style(self._loaded, law).commands)
+        self._law = law
 
     @property
     def _loaded(self) -> Packing:

@@ -97,6 +97,59 @@ def test_an_instance_goes_on_after_a_refusal(tmp_path):
     assert read_dump(tmp_path / "a.dump", shape="spherocylinder")[-1].step == 2 * STEPS
 
 
+@pytest.mark.parametrize(
+    ("refused", "then"),
+    [
+        ("thermo_style custom step v_nope", "run 0\nthermo_style one\nrun 0"),
+        ("thermo_style custom step c_nope", "run 0\nthermo_style custom step pe\nrun 0"),
+        ("unfix drive\nmin_style foo", "minimize 0 0 1 1\nmin_style cg\nminimize 0 0 1 1"),
+        ("run_style respa", "run 0\nrun_style verlet\nrun 0"),
+        ("run_style foo", "run 0\nrun_style verlet\nrun 0"),
+        ("kspace_style foo", "run 0\nkspace_style none\nrun 0"),
+        ("fix drive all overdamped/affine drag -1", "run 0\ninfo fixes\nrun 0"),
+        ("clear\natom_style foo", "region a block 0 1 0 1 -0.5 0.5\ncreate_box 1 a"),
+    ],
+)
+def test_what_a_refused_command_would_have_replaced_is_there(refused, then):
+    """LAMMPS deletes it first, and would then end the process."""
+    with Session() as session:
+        begin(session)
+        session.commands("run 0")
+        with pytest.raises(LammpsError):
+            session.commands(refused)
+        session.commands(then)
+        with pytest.raises(LammpsError, match=r"^Unknown command: joke$"):
+            session.commands("joke")
+
+
+def test_a_dump_that_cannot_be_written_is_removed_and_others_stay(tmp_path):
+    wrong = tmp_path / "no" / "such.dump"
+    with Session() as session:
+        begin(session)
+        session.commands("\n".join(
+            f'dump {name} all custom 1 "{path}" id' for name, path in
+            (("a", tmp_path / "a.dump"), ("b", wrong), ("c", tmp_path / "c.dump"))
+        ))  # fmt: skip
+        sentence = f"found a dump whose file cannot be opened, .* removed b \\({wrong}\\): repeat the command dump"
+        with pytest.raises(LammpsError, match=sentence):
+            session.commands("run 0")
+        session.commands(f'run 0\nrun 0\ndump b all custom 1 "{tmp_path}/b.dump" id\nrun 1')
+    assert all((tmp_path / f"{name}.dump").stat().st_size for name in "abc")
+
+
+def test_a_pair_style_is_given_again_after_a_refusal():
+    with Session() as session:
+        begin(session)
+        with pytest.raises(LammpsError, match=r"^Unrecognized pair style 'spherocylinder/harmonc'"):
+            session.commands("pair_style spherocylinder/harmonc sides two")
+        for _ in range(2):
+            with pytest.raises(LammpsError):
+                session.commands("run 0")
+        session.interact(Interaction(2.0))
+        session.commands("run 0")
+        assert js.load(session).law == session.packing().law
+
+
 def test_a_compression_that_is_refused_leaves_a_whole_file(tmp_path, monkeypatch):
     """Its time step is past what the pressure on the way lets it be."""
     monkeypatch.setattr(recorder, "PAUSE", 0.0)
