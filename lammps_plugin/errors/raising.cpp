@@ -80,18 +80,6 @@ void replace(const char *function, Owner *owner, Style *&style, char *&name,
 using CreateByWords = void (*)(LAMMPS_NS::Update *, int, char **, int);
 using CreateByName = void (*)(LAMMPS_NS::Force *, const std::string &, int);
 
-/// The sentence for an exception that is not LAMMPS's own, after which the next command may begin
-/// a run or minimisation.
-const char *after(const std::exception &error, LAMMPS_NS::LAMMPS *lammps)
-{
-  lammps->update->whichflag = 0;
-  // LAMMPS reads the name of a pair style that it has deleted.
-  if (lammps->force->pair_style == nullptr)
-    return "LAMMPS found no pair style, since it refused the last one, expected one; give "
-           "pair_style and pair_coeff";
-  return error.what();
-}
-
 }  // namespace
 
 namespace LAMMPS_NS {
@@ -155,7 +143,8 @@ int jamshape_command(char *(*lammps_command)(void *, const char *), void *lammps
   } catch (const Refusal &refusal) {
     return refused(refusal.sentence.c_str());
   } catch (const std::exception &error) {  // such as std::bad_alloc
-    return refused(after(error, static_cast<LAMMPS_NS::LAMMPS *>(lammps)));
+    static_cast<LAMMPS_NS::LAMMPS *>(lammps)->update->whichflag = 0;
+    return refused(error.what());
   }
   is_within = false;
   return 0;

@@ -142,12 +142,13 @@ def test_a_pair_style_is_given_again_after_a_refusal():
         begin(session)
         with pytest.raises(LammpsError, match=r"^Unrecognized pair style 'spherocylinder/harmonc'"):
             session.commands("pair_style spherocylinder/harmonc sides two")
-        for _ in range(2):
-            with pytest.raises(LammpsError):
-                session.commands("run 0")
+        for command in ("run 0", "run 0", "minimize 0 0 1 1", "pair_coeff * * 1.0"):
+            with pytest.raises(LammpsError, match=r"^LAMMPS found no pair style, since it refused"):
+                session.commands(command)
+        assert session.packing().n == js.load(session, shape="spherocylinder").n == 16
         session.interact(Interaction(2.0))
         session.commands("run 0")
-        assert js.load(session).law == session.packing().law
+        assert js.load(session).law.k_e == 2.0
 
 
 def test_a_compression_that_is_refused_leaves_a_whole_file(tmp_path, monkeypatch):
