@@ -21,23 +21,24 @@ from jamshape.files.h5md import (
     read_observables,
     read_origin,
     read_packing,
+    read_particles,
     read_report,
 )
 from jamshape.files.lammps_text import read_data
 from jamshape.files.meaning import NOTHING, Wanted
 from jamshape.files.outcomes import is_reached, shortfall
 from jamshape.files.signature import DATA, DUMP, GSD, HDF5, REFUSED, RESTART, SIGNATURES, format_of
+from jamshape.files.vocabulary import ENSEMBLE, KIND
 from jamshape.front.frames import frames
 from jamshape.front.packing import Packing, public, results_of
 from jamshape.front.recorded import KINDS, run_file
 from jamshape.front.run import CyclicShearFile, QuasistaticShearFile
 from jamshape.packing import Packing as PackingLike
-from jamshape.protocols.ensemble import ENSEMBLE
-from jamshape.recording.driver import KIND
 from jamshape.vibration.ensembles import TOLD, count_of, of_packing
 from jamshape.vibration.table import ModeTable, holds_modes, read_modes
 
 _OF_CONTACTS = ("pressure", "u", "z", "z_single", "z_bearing")
+_OF_A_STATE = ("box", "tilt", "step", "time")
 _STATE = ("phi", *_OF_CONTACTS, "rattlers")
 _MOST_CUBATIC = 2000  # particles whose cubatic order takes less than a second
 _MADE = ("seed", "kappa", "u0", "protocol", "phi_start", "phi_end", "gdot",
@@ -99,11 +100,10 @@ def _hdf5(path: Path) -> dict[str, Any]:
 
 def _particles(path: Path) -> dict[str, Any]:
     """Describe an H5MD file."""
-    known, packing = read_attributes(path), read_packing(path)
+    known = read_attributes(path)
     is_run = str(known.get(KIND)) in KINDS
-    found: dict[str, Any] = {"kind": known[KIND] if is_run else "packing", **_of_packing(packing)}
-    is_changed = bool(known) and not results_of(path, packing)
-    found |= _state(packing, {} if is_changed else _measured(path, known))
+    found: dict[str, Any] = {"kind": known[KIND] if is_run else "packing"}
+    found |= _table(path) if known.get(KIND) == ENSEMBLE else _last_state(path, known)
     found |= _picked(known, _MADE) | {"finished": bool(known.get("finished", not is_run))}
     if "kappa" in found:
         found["kappa"] = np.ravel(found["kappa"])[-1].item()
@@ -111,12 +111,27 @@ def _particles(path: Path) -> dict[str, Any]:
         found |= {"reached": is_reached(known), "shortfall": shortfall(known) or None}
     if is_run and "cycles" in known:
         found |= _last_cycle(path)
-    found |= {"frames": count_frames(path), **_cost(path, known)}
+    found |= _cost(path, known)
     found |= {"format_version": read_format_version(path), "jamshape_version": read_creator(path)}
     found |= {"origin": origin} if (origin := read_origin(path)) else {}
     if not found["finished"]:
         found["go_on"] = _go_on(path, known)
     return found
+
+
+def _last_state(path: Path, known: Mapping[str, Any]) -> dict[str, Any]:
+    """Describe a packing, or the last frame of a run."""
+    packing = read_packing(path)
+    is_changed = bool(known) and not results_of(path, packing)
+    state = _state(packing, {} if is_changed else _measured(path, known))
+    return {**_of_packing(packing), **state, "frames": count_frames(path)}
+
+
+def _table(path: Path) -> dict[str, Any]:
+    """Describe the particles of an ensemble, which has no box of its own, and count its samples."""
+    found = _of_packing(read_particles(path))
+    own = {name: value for name, value in found.items() if name not in _OF_A_STATE}
+    return own | {"samples": len(read_observables(path).get("seed", ()))}
 
 
 def _of_packing(packing: PackingLike) -> dict[str, Any]:

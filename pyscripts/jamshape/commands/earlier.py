@@ -21,13 +21,12 @@ from jamshape.files.content import Content
 from jamshape.files.disk import replacing
 from jamshape.files.hdf5 import FileFormatError
 from jamshape.files.signature import GSD, HDF5, format_of
-from jamshape.files.vocabulary import FORMAT_VERSION, protocol_named, require_format
+from jamshape.files.vocabulary import FORMAT_VERSION, KIND, protocol_named, require_format
 from jamshape.front.recorded import KINDS
 from jamshape.old_names import VALUES
 from jamshape.packing import Packing
 from jamshape.protocols.approach import FOR_A_PACKING
 from jamshape.protocols.make import MAKING
-from jamshape.recording.driver import KIND
 from jamshape.shapes.shape import Interaction
 from jamshape.shapes.table import SHAPES
 from jamshape.vibration.ensembles import PREFIX

@@ -46,7 +46,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -55,12 +55,16 @@ from jamshape.arrays import FloatArray, IntArray
 from jamshape.checks import require_other_file
 from jamshape.files import layout
 from jamshape.files.content import Content
-from jamshape.files.disk import PathLike, replacing, store
+from jamshape.files.disk import PathLike, named, replacing, store
 from jamshape.files.frames import row_of
 from jamshape.files.hdf5 import FileFormatError, attribute, attributes, require_item
 from jamshape.files.layout import Report, Series
+from jamshape.files.vocabulary import ENSEMBLE, KIND
 from jamshape.packing import Packing
 from jamshape.shapes.table import DEFAULT
+
+if TYPE_CHECKING:
+    import h5py
 
 __all__ = [
     "FileFormatError",
@@ -77,6 +81,7 @@ __all__ = [
     "read_origin",
     "read_packing",
     "read_packings",
+    "read_particles",
     "read_report",
     "read_series",
     "read_style",
@@ -202,13 +207,21 @@ def read_packing(path: PathLike, frame: int = -1) -> Packing:
         If the file cannot be opened.
     """
     with layout.opened(path) as file:
+        _require_frames(path, file)
         reader = layout.FrameReader(file)
         return reader.read(row_of(frame, reader.n_frames, path))
+
+
+def read_particles(path: PathLike) -> Packing:
+    """Read the first frame for its particles alone, also of a table; errors as `read_packing`."""
+    with layout.opened(path) as file:
+        return layout.FrameReader(file).read(0)
 
 
 def read_packings(path: PathLike, frames: Sequence[int]) -> list[Packing]:
     """Read some frames, counted from 0; errors as `read_packing`."""
     with layout.opened(path) as file:
+        _require_frames(path, file)
         reader = layout.FrameReader(file)
         return [reader.read(row_of(frame, reader.n_frames, path)) for frame in frames]
 
@@ -216,6 +229,7 @@ def read_packings(path: PathLike, frames: Sequence[int]) -> list[Packing]:
 def read_clock(path: PathLike) -> tuple[IntArray, FloatArray]:
     """Read steps (T,) and times (T,) of the frames; errors as `read_packing`."""
     with layout.opened(path) as file:
+        _require_frames(path, file)
         element = "particles/all/position"
         n_frames = layout.count(file, element)
         step, time = (
@@ -223,6 +237,17 @@ def read_clock(path: PathLike) -> tuple[IntArray, FloatArray]:
             for name in ("step", "time")
         )
         return step, time
+
+
+def _require_frames(path: PathLike, file: h5py.File) -> None:
+    """Refuse the table of an ensemble, whose only frame is a random start that stands for its particles."""
+    if attribute(require_item(file, "parameters"), KIND, "") != ENSEMBLE:
+        return
+    known = attributes(file, "parameters")  # also those that are datasets
+    samples, folder = np.size(known.get("ensemble_seeds", ())), known.get("folder")
+    advice = f"its packings are in {folder}" if folder else "make it with folder= to keep packings"
+    msg = f"{named(Path(path))} holds a table of {samples} samples, expected a packing or a run; {advice}"
+    raise FileFormatError(msg)
 
 
 def count_frames(path: PathLike) -> int:

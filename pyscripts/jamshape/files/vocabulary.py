@@ -11,6 +11,12 @@ from jamshape.files.hdf5 import FileFormatError
 FORMAT_VERSION = 3
 """Version of these names and of the layout; 2 and, for files that do not state one, 1 are those of jamshape 0.1.0."""
 
+KIND = "kind"
+"""Attribute of the files of drivers."""
+
+ENSEMBLE = "ensemble"
+"""Kind of the files of ensembles."""
+
 COMPRESSED, ATHERMAL, THERMAL = "marschall-2018", "yuan-2019-1", "yuan-2019-2"
 """Published protocols, by name."""
 

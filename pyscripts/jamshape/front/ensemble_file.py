@@ -4,22 +4,28 @@ from __future__ import annotations
 
 import json
 import warnings
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from jamshape.arguments import checked
 from jamshape.arrays import BoolArray, IntArray
 from jamshape.checks import NotReachedWarning
+from jamshape.files.frames import row_of
 from jamshape.files.h5md import read_origin
+from jamshape.front.packing import Packing
 from jamshape.front.run import Recorded
+from jamshape.protocols.ensemble import FAILED, kept_file
 
 
 class EnsembleFile(Recorded):
     """An ensemble of packings in its H5MD file, a row for each seed; parameters as in `Recorded`.
 
     ``table["phi_J"]`` looks up a column: phi, phi_J, pressure, u, z, z_single, n_rattlers, S2, residual, evaluations,
-    wall_seconds and others by the names of packings' results; NaN where a sample failed, or has none.
+    wall_seconds and others by the names of packings' results; NaN where a sample failed, or has none. It holds no
+    packings; those kept in a folder are read by ``table.packing(row)``.
 
     Examples
     --------
@@ -56,6 +62,29 @@ class EnsembleFile(Recorded):
     def origin(self) -> str:
         """Type of machine on which the last bits depend."""
         return read_origin(self.file)
+
+    @checked
+    def packing(self, frame: int = -1) -> Packing:
+        """Read the packing of a row, counted from 0 or, if negative, from the end.
+
+        Raises
+        ------
+        ValueError
+            If the packings were not kept in a folder, or this sample failed.
+        """
+        row = row_of(frame, len(self), self.file)
+        seed = int(self.seeds[row])
+        path = kept_file(self.about, seed)
+        if path is None:
+            return super().packing()  # raises, since a table holds no packings
+        if self.outcome[row] == FAILED:
+            msg = f"the sample of seed {seed} failed, expected one with a packing: {self.failures[seed]}"
+            raise ValueError(msg)
+        return Packing.read(path)
+
+    def __iter__(self) -> Iterator[Packing]:
+        """Read the packings of all rows."""
+        return (self.packing(row) for row in range(len(self)))
 
     def to_pandas(self) -> Any:
         """Return a `pandas.DataFrame`, a row for each seed; needs the package pandas."""

@@ -8,10 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from jamshape.arguments import checked
-from jamshape.files.h5md import copy_run, read_attributes, write_packing, write_run
+from jamshape.files.h5md import (
+    copy_run,
+    read_attributes,
+    read_particles,
+    write_packing,
+    write_run,
+)
 from jamshape.files.lammps_text import write_data, write_dump
 from jamshape.files.meaning import Wanted, require_told
 from jamshape.files.signature import HDF5, format_of
+from jamshape.files.vocabulary import KIND
 from jamshape.front.frames import Frames
 from jamshape.front.modes import Modes
 from jamshape.front.packing import Packing
@@ -20,7 +27,6 @@ from jamshape.front.recorded import KINDS, run_file
 from jamshape.front.run import Recorded
 from jamshape.lammps.living import Living
 from jamshape.packing import Packing as PackingLike
-from jamshape.recording.driver import KIND
 from jamshape.vibration.table import holds_modes
 
 
@@ -80,7 +86,7 @@ def load(
                 return Modes.read(path)
             if frame is None and str(read_attributes(path).get(KIND)) in KINDS:
                 run = run_file(path)
-                require_told(path, run.packing(0), Wanted(dimension, shape))
+                require_told(path, read_particles(path), Wanted(dimension, shape))
                 return run
     return packing_of(path, -1 if frame is None else frame, dimension=dimension, shape=shape)
 

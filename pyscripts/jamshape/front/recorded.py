@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from jamshape.arguments import checked
 from jamshape.checks import require_given, require_path
 from jamshape.files.h5md import FileFormatError, read_attributes
+from jamshape.files.vocabulary import ENSEMBLE, KIND
 from jamshape.flow import cyclic_driver, implicit_driver, lammps_driver, quasistatic_driver
 from jamshape.flow.compression import Compression
 from jamshape.flow.cyclic_shear import CyclicShear
@@ -30,10 +31,9 @@ from jamshape.front.run import (
 from jamshape.packing import Packing
 from jamshape.protocols import ensemble, ladder
 from jamshape.protocols.approach import FOR_A_PACKING
-from jamshape.protocols.ensemble import ENSEMBLE
 from jamshape.protocols.ladder import Ladder
 from jamshape.protocols.make import MAKING
-from jamshape.recording.driver import KIND, Plan
+from jamshape.recording.driver import Plan
 from jamshape.recording.recorder import How, record
 
 

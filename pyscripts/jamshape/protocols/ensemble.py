@@ -16,6 +16,7 @@ from jamshape.command import plain
 from jamshape.files.checkpoint import Checkpoint
 from jamshape.files.h5md import read_attributes
 from jamshape.files.outcomes import is_reached, shortfall
+from jamshape.files.vocabulary import ENSEMBLE
 from jamshape.minima import Outcome
 from jamshape.packing import Packing
 from jamshape.protocols.defaults import recipe_for
@@ -24,9 +25,6 @@ from jamshape.protocols.recipe import Recipe
 from jamshape.recording.driver import Plan, Row, Told
 from jamshape.recording.workers import Workers, cores
 from jamshape.shapes.particles import Particles
-
-ENSEMBLE = "ensemble"
-"""Kind of the files of ensembles."""
 
 FAILED = "failed"
 """Outcome of a sample without a packing."""
@@ -113,14 +111,29 @@ class Means(NamedTuple):
 
 def plan_again(stored: Mapping[str, Any]) -> Plan | None:
     """Plan the ensemble of a file from its attributes; None if they do not describe it."""
+    if not (recipe := _recipe_again(stored)):
+        return None
+    seeds, folder = [int(seed) for seed in stored["ensemble_seeds"]], str(stored["folder"])
+    means = Means(cores(), Path(folder) if folder else None, str(stored["arguments"]))
+    return plan(recipe, seeds, means)
+
+
+def kept_file(stored: Mapping[str, Any], seed: int) -> Path | None:
+    """Name the file of a sample from the attributes of its ensemble; None if it was not kept."""
+    recipe, folder = _recipe_again(stored), str(stored.get("folder", ""))
+    if not (recipe and folder):
+        return None
+    return file_of(Path(folder), dataclasses.replace(recipe, seed=seed))
+
+
+def _recipe_again(stored: Mapping[str, Any]) -> Recipe | None:
+    """Make the recipe of the first sample from attributes; None if they do not describe it."""
     if not (arguments := str(stored.get("arguments", ""))):
         return None
-    given, folder = json.loads(arguments), str(stored["folder"])
+    given = json.loads(arguments)
     if known := given.pop("particles", None):
         given["particles"] = Particles.again(known.pop("shape"), known)
-    seeds = [int(seed) for seed in stored["ensemble_seeds"]]
-    recipe = recipe_for(seed=seeds[0], **given)
-    return plan(recipe, seeds, Means(cores(), Path(folder) if folder else None, arguments))
+    return recipe_for(seed=int(stored["ensemble_seeds"][0]), **given)
 
 
 def plan(recipe: Recipe, seeds: Sequence[int], means: Means) -> Plan:

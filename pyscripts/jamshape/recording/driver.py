@@ -16,9 +16,6 @@ from numpy.typing import ArrayLike
 from jamshape.files.checkpoint import Checkpoint
 from jamshape.packing import Packing
 
-KIND = "kind"
-"""Attribute of the files of drivers."""
-
 
 class Told(NamedTuple):
     """Progress of a run."""

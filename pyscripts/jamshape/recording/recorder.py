@@ -23,7 +23,8 @@ from jamshape.files.content import Content
 from jamshape.files.disk import remove_leftovers
 from jamshape.files.hdf5 import FileFormatError
 from jamshape.files.lock import Lock
-from jamshape.recording.driver import KIND, Driver, Plan, Row
+from jamshape.files.vocabulary import KIND
+from jamshape.recording.driver import Driver, Plan, Row
 from jamshape.recording.interrupts import Interrupts
 
 PAUSE = 100.0

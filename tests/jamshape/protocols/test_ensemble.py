@@ -138,6 +138,40 @@ def test_failures_are_rows_with_their_reasons(tmp_path):
     assert not table.reached[1]
     kept = js.load(folder / "alpha0_seed5.h5")
     assert kept.results["phi_J"] == table["phi_J"][2]
+    with pytest.raises(ValueError, match=r"the sample of seed 4 failed, .*alpha0_seed4.h5"):
+        table.packing(1)
+
+
+def test_a_table_is_no_packing(table, tmp_path):
+    file, said = table.file, r"set.h5 holds a table of 8 samples, expected a packing or a run; make"
+    for use in (
+        lambda: js.energy(file),
+        lambda: js.minimise(file, progress=False),
+        lambda: js.quasistatic_shear(start=file, progress=False),
+        lambda: js.frames(file),
+        lambda: js.load(file, 0),
+        table.packing,
+        lambda: list(table),
+        lambda: js.save(tmp_path / "set.gsd", table),
+    ):
+        with pytest.raises(FileFormatError, match=said):
+            use()
+    found = contents_of(file)
+    assert found["samples"] == 8
+    assert not {"phi", "box", "frames"} & found.keys()
+    js.save(tmp_path / "copy.h5", table)
+    assert same(table, js.load(tmp_path / "copy.h5", dimension=2))
+
+
+def test_packings_in_a_folder_are_read_by_their_rows(tmp_path):
+    file, folder = tmp_path / "set.h5", tmp_path / "packings"
+    table = js.ensemble(DISCS, **HOW | {"seeds": [3, 4]}, file=file, folder=folder)
+    assert [packing.phi for packing in table] == table["phi"].tolist()
+    assert table.packing().results["seed"] == 4
+    with pytest.raises(
+        FileFormatError, match=r"holds a table of 2 samples.*packings are in .*packings"
+    ):
+        js.energy(file)
 
 
 def test_no_worker_outlives_the_process_that_started_it(tmp_path):
