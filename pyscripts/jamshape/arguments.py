@@ -108,7 +108,7 @@ def _taken(name: str, value: Any, kinds: tuple[Any, ...]) -> Any:
         return value
     with contextlib.suppress(_UnfitError):
         return _fitted_to_one(value, kinds)
-    msg = f"{name} is {_shown(value)}, expected {_named(name, kinds)}"
+    msg = f"{name} is {_shown(value)}, expected {_named(name, kinds)}{_pair_with(value, kinds)}"
     raise ArgumentTypeError(msg)
 
 
@@ -185,6 +185,15 @@ def _named(name: str, kinds: tuple[Any, ...]) -> str:
         return described(RANGES[name])
     kinds = tuple(kind for kind in kinds if kind is not str) if Path in kinds else kinds
     return " or ".join(dict.fromkeys(_name(kind) for kind in kinds if kind is not types.NoneType))
+
+
+def _pair_with(value: Any, kinds: tuple[Any, ...]) -> str:
+    """Complete a single number that was given in place of a pair whose first number may be left out."""
+    pairs = (typing.get_args(kind) for kind in kinds if typing.get_origin(kind) is tuple)
+    is_half = isinstance(value, numbers.Real) and any(
+        types.NoneType in typing.get_args(pair[0]) for pair in pairs
+    )
+    return f" such as (None, {said(value)})" if is_half else ""
 
 
 def _name(kind: Any) -> str:

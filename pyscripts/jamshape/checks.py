@@ -388,13 +388,35 @@ def require_other_file(out: Path, inputs: Sequence[Path]) -> None:
     ValueError
     """
     require_path(out)
-    if out.is_dir():
-        msg = f"{out} is a folder, expected the name of a file to write"
-        raise ValueError(msg)
+    require_no_folder(out)
     for path in inputs:
         if out.exists() and path.exists() and out.samefile(path):
             msg = f"{out} is an input and would be replaced, expected another output file"
             raise ValueError(msg)
+
+
+def require_no_folder(path: Path) -> None:
+    """Refuse the path of a file to write that is a folder.
+
+    Raises
+    ------
+    ValueError
+    """
+    if path.is_dir():
+        msg = f"{path} is a folder, expected the name of a file to write; add a name to it"
+        raise ValueError(msg)
+
+
+def require_folder(path: Path) -> None:
+    """Refuse the path of a folder to write to that is a file.
+
+    Raises
+    ------
+    ValueError
+    """
+    if path.exists() and not path.is_dir():
+        msg = f"{path} is a file, expected a folder for the files to write; choose another name"
+        raise ValueError(msg)
 
 
 def require_free(out: Path, *, again: bool, go_on: str = "") -> None:
@@ -413,6 +435,7 @@ def require_free(out: Path, *, again: bool, go_on: str = "") -> None:
     ValueError
     """
     require_path(out)
+    require_no_folder(out)
     if out.exists() and not again:
         msg = f"{out} exists, expected another --out, {go_on}or --again to replace it"
         raise ValueError(msg)

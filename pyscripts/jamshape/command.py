@@ -15,6 +15,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import signal
 import sys
 import warnings
@@ -42,6 +43,18 @@ _INTERRUPTED = 130  # the shell's exit code after Ctrl-C
 _BROKEN_PIPE = 141  # and for a closed output pipe
 
 
+class Parser(ArgumentParser):
+    """A parser that shows texts as they are, and that takes -1e-6 for a number as well as -0.1."""
+
+    def __init__(self, **how: Any) -> None:
+        super().__init__(**{"formatter_class": RawDescriptionHelpFormatter, **how})
+        # Python before 3.14 takes numbers with an exponent for options.
+        self._negative_number_matcher = _NEGATIVE
+
+
+_NEGATIVE = re.compile(r"-(?:\d+(?:_\d+)*\.?\d*|\.\d+)(?:e[-+]?\d+)?$|-(?:inf|nan)$", re.IGNORECASE)
+
+
 def parser_of(doc: str | None, out: str = "", files: str = "") -> ArgumentParser:
     """Make a parser whose help is a script's docstring, optionally with --out and files.
 
@@ -54,7 +67,7 @@ def parser_of(doc: str | None, out: str = "", files: str = "") -> ArgumentParser
     files : str
         Metavar of the input files, one or more, stored as `files`.
     """
-    parser = ArgumentParser(description=doc, formatter_class=RawDescriptionHelpFormatter)
+    parser = Parser(description=doc)
     if files:
         parser.add_argument("files", type=Path, nargs="+", metavar=files, help="folders or files")
     if out:

@@ -187,7 +187,6 @@ CASES = [
     *each("modes start.h5 --force --out new.h5", ["--lowest"], ["0", "-1", "x", "99999999999"]),
     *each("modes start.h5 --force --out new.h5", ["--near", "--least-force"], ["nan", "-1", "x", "inf"]),
     ("draw start.h5 --out start.h5", "would be replaced"),
-    ("draw start.h5 --out new.nothing", "supported formats"),
     ("draw start.h5 --out none/new.png", "none"),
     *((f"draw {name} --out new.png", name) for name in ("none.h5", "text.h5", "other.h5", "empty.h5", "cut.dump")),
     *each("draw start.h5 --out new.png", ["--dpi"], ["0", "-1", "x", "100000"]),
@@ -211,6 +210,18 @@ CASES = [
     ("sweep --out new --alpha 1 --kapa 1", "unrecognized arguments"),
     ("sweep --out new --alpha 1 --seconds -1", "--seconds is -1.0, expected a time from 0 to 1e+09"),
     ("sweep --out new --superellipsoid 1", "expected 3"),
+    ("sweep --out start.h5 --alpha 1 --samples 1", "start.h5 is a file, expected a folder"),
+    ("sweep --out new --alpha 1 --samples 1 --plot new.foo", "new.foo ends in '.foo', expected the name of a picture"),
+    *((f"{command} --out new.{end}", f"new.{end} ends in '.{end}', expected the name of an HDF5 file, such as new.h5")
+      for command, end in (("pack --n 8", "data"), ("pack --n 8", "dump"), ("pack --n 8", "xyz"), ("minimise start.h5", "GSD"),
+                           ("compress --n 8", "txt"), ("slow --n 8", "png"), ("modes dense.h5", "data"))),
+    *((f"{command} --out 'a folder'", "a folder is a folder, expected the name of a file to write")
+      for command in ("pack --n 8", "compress --n 8", "export start.h5", "modes dense.h5")),
+    ("draw 'a folder' --out new.png", "a folder is a folder, expected a file"),
+    ("draw start.h5 --out new.foo", "new.foo ends in '.foo', expected the name of a picture"),
+    ("modes dense.h5 --out new.h5 --plot new.foo", "new.foo ends in '.foo', expected the name of a picture"),
+    ("pack --n 8 --u0 -1e-6 --out new.h5", "u0 is -1e-06, expected 0 or an energy density"),
+    ("aqs --n 8 --step -1E-3 --out new.h5", "strain_step is -0.001, expected a step"),
     ("sing", "there is no command"),
     ("", "usage"),
 ]  # fmt: skip

@@ -153,6 +153,9 @@ def cases():
         "make n": make(n=0),
         "make seed": make(seed=0.5),
         "make file": make(file="start.h5"),
+        "make a data file": make(file="new.data"),
+        "make a folder": make(file="a folder"),
+        "ensemble in a file": lambda: js.ensemble(RODS, n=8, seeds=[1], folder="start.h5"),
         "slow kappa": slow(kappa=0.0),
         "slow kappas": slow(kappa=[1e-6, 1e-7]),
         "slow falling": slow(kappa=[(0.9, 1e-6), (0.8, 1e-7)]),
@@ -229,6 +232,7 @@ def cases():
         "read data": lambda: read_data("text.data"),
         "write to a folder": lambda: write_packing("a folder", random_packing(4, 0.2, 1)),
         "modes over a packing": lambda: js.modes("start.h5", force=True).save("start.h5"),
+        "modes in a picture": lambda: js.modes("start.h5", force=True).save("new.png"),
         "modes over text": lambda: js.modes("start.h5", force=True).save("text.h5"),
     }.items()  # fmt: skip
 

@@ -16,7 +16,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from jamshape.checks import require_path
+from jamshape.checks import require_folder, require_path
 from jamshape.command import parser_of, report
 from jamshape.commands.earlier import Converted, convert
 from jamshape.files.disk import store
@@ -43,6 +43,7 @@ def _outs(files: list[Path], folder: Path | None) -> list[Path]:
     """Name the files to write; refuse to write two to one place, or over another."""
     if folder is None:
         return files
+    require_folder(folder)
     outs = [folder / path.name for path in files]
     out, n = Counter(outs).most_common(1)[0]
     if n > 1:

@@ -26,6 +26,7 @@ from jamshape.drawing.colors import CHOICES, NAMED, color_of
 from jamshape.drawing.movie import MOVIES
 from jamshape.drawing.packing import Look
 from jamshape.drawing.pictures import draw_pictures, read_picture, save_pictures
+from jamshape.drawing.saving import require_picture
 from jamshape.files.meaning import Wanted
 from jamshape.files.signature import HDF5, format_of
 from jamshape.front.files import load
@@ -120,6 +121,7 @@ def main(options: Namespace) -> None:
     if options.out.suffix.lower() in MOVIES:
         _movie(options)
         return
+    options.out = require_picture(options.out)
     _require_none(options, "every", "fps", "mode", "amplitude")
     for path in options.files:
         if format_of(path) == HDF5 and holds_modes(path):

@@ -11,13 +11,13 @@ line of standard output is one JSON object. `jamshape draw` makes pictures.
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from jamshape.checks import require_free, require_other_file
-from jamshape.command import report
+from jamshape.command import parser_of, report
 from jamshape.contacts import Contacts
 from jamshape.exchange.gsd import write_gsd
 from jamshape.exchange.mdanalysis import write_mdanalysis
@@ -83,11 +83,8 @@ FORMATS = {
 def options_of() -> ArgumentParser:
     """Make the parser."""
     rows = [f"  {name:11} {one.end:7} {one.meaning}" for name, one in FORMATS.items()]
-    parser = ArgumentParser(
-        description=__doc__,
-        formatter_class=RawDescriptionHelpFormatter,
-        epilog="\n".join(["formats, with suffixes of --out:", *rows]),
-    )
+    parser = parser_of(__doc__)
+    parser.epilog = "\n".join(["formats, with suffixes of --out:", *rows])
     parser.add_argument("file", type=Path, metavar="FILE", help="input file")
     parser.add_argument("--to", choices=FORMATS, help="format (by the suffix of --out)")
     parser.add_argument("--out", type=Path, required=True, help="file to write")

@@ -20,6 +20,7 @@ from jamshape.arrays import IntArray
 from jamshape.checks import require_other_file
 from jamshape.command import report
 from jamshape.commands.signatures import called, parser_for
+from jamshape.drawing.saving import require_picture, save_figure
 from jamshape.front.laddering import ladder
 from jamshape.front.run import LadderFile
 
@@ -47,6 +48,7 @@ def main(options: Namespace) -> None:
     """Begin or resume, compare contacts, draw, report."""
     if options.plot:
         require_other_file(options.plot, [options.out, options.packing])
+        require_picture(options.plot)
     run = called(ladder, options)
     if options.plot:
         _save_plot(run, options.plot)
@@ -70,8 +72,6 @@ def _state(run: LadderFile, changed: dict[str, IntArray], k: int) -> dict[str, A
 
 def _save_plot(run: LadderFile, path: Path) -> None:
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help
-
-    from jamshape.drawing.saving import save_figure  # noqa: PLC0415
 
     figure = Figure(figsize=(5, 3.6), layout="constrained")
     run.plot(figure.add_subplot())

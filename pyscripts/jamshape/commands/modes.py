@@ -21,7 +21,7 @@ from jamshape.checks import require_other_file
 from jamshape.command import report
 from jamshape.commands.signatures import called, parser_for
 from jamshape.drawing.modes import mode_figure
-from jamshape.drawing.saving import save_figure
+from jamshape.drawing.saving import require_picture, save_figure
 from jamshape.drawing.text import packing_text
 from jamshape.files.ensembles import PackingFile
 from jamshape.front.modes import Modes, modes, require_modes_file
@@ -152,6 +152,7 @@ def main(options: Namespace) -> None:
     require_modes_file(options.out, [options.packing])
     if options.plot:
         require_other_file(options.plot, [options.packing, options.out])
+        require_picture(options.plot)
     found: Modes = called(modes, options)
     table, packing, matrix = found.table, found.packing, found.matrix
     assert packing is not None

@@ -19,18 +19,18 @@ import fcntl
 import os
 import sys
 import time
-from argparse import Action, ArgumentError, ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from argparse import Action, ArgumentError, ArgumentParser, Namespace
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
 from io import StringIO
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
-from jamshape.checks import RANGES, TIME_IS_UP, require_in
-from jamshape.command import report
+from jamshape.checks import RANGES, TIME_IS_UP, require_folder, require_in
+from jamshape.command import Parser, report
 from jamshape.commands import main as command
 from jamshape.commands import pack
-from jamshape.drawing.saving import save_figure
+from jamshape.drawing.saving import require_picture, save_figure
 from jamshape.drawing.sweep import sweep_figure
 from jamshape.files.ensembles import PackingFile
 from jamshape.front.progress import follow
@@ -47,7 +47,7 @@ _PATIENCE = 5.0
 GO_ON = "the same command resumes from the files of the packings"
 
 
-class _Parser(ArgumentParser):
+class _Parser(Parser):
     """Passes unknown options on to each packing."""
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
@@ -100,7 +100,6 @@ def options_of() -> ArgumentParser:
     """Make the parser; unknown options go to each packing."""
     parser = _Parser(
         description=__doc__,
-        formatter_class=RawDescriptionHelpFormatter,
         epilog="Other options (--n, --u0, --kappa ...) are those of jamshape pack.",
     )
     parser.add_argument(
@@ -292,6 +291,9 @@ def main(options: Namespace) -> int:
     """Run all samples; return the exit code."""
     if options.seconds is not None:
         require_in("--seconds", options.seconds, RANGES["seconds"])
+    require_folder(options.out)
+    if options.plot:
+        require_picture(options.plot)
     options.out.mkdir(parents=True, exist_ok=True)
     options.until = None if options.seconds is None else time.monotonic() + options.seconds
     total, done = options.samples * len(particles(options)), 0

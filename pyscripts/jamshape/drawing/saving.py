@@ -35,9 +35,28 @@ def save_figure(figure: Figure, path: PathLike, **how: Any) -> None:
     >>> from jamshape.drawing.saving import save_figure
     >>> save_figure(Figure(), "empty.png")
     """
-    place = with_end(path)
+    place = require_picture(path)
     with replacing(place) as temporary:
         figure.savefig(temporary, format=place.suffix[1:], **how)
+
+
+def require_picture(path: PathLike) -> Path:
+    """Return the path of a picture as by `with_end`, or refuse one whose format matplotlib does not write.
+
+    Raises
+    ------
+    ValueError
+    """
+    from matplotlib.backend_bases import FigureCanvasBase  # noqa: PLC0415 - slow
+
+    place = with_end(path)
+    if place.suffix[1:].lower() not in FigureCanvasBase.get_supported_filetypes():
+        msg = (
+            f"{place} ends in {place.suffix!r}, expected the name of a picture; choose one that ends in .png, .pdf"
+            " or .svg"
+        )
+        raise ValueError(msg)
+    return place
 
 
 def with_end(path: PathLike) -> Path:

@@ -25,8 +25,12 @@ _REFUSALS = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO}
 
 _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
 
-# Suffixes of formats other than HDF5.
-_OTHERS = {".data", ".gsd", ".dump", ".png", ".pdf", ".csv", ".json", ".txt"}
+# Suffixes of formats other than HDF5: of particles, of numbers, of pictures, and of compressed files.
+_OTHERS = {
+    *(".data", ".dump", ".lammpstrj", ".gsd", ".xyz", ".extxyz", ".pdb", ".cif", ".vtk", ".ovito"),
+    *(".txt", ".csv", ".dat", ".json", ".yaml", ".npy", ".npz", ".pkl", ".gz", ".zst"),
+    *(".png", ".jpg", ".jpeg", ".pdf", ".svg", ".eps", ".gif", ".mp4", ".m4v", ".mkv", ".mov"),
+}
 
 
 class FileFormatError(ValueError):
@@ -186,8 +190,11 @@ def require_hdf5_name(path: Path) -> None:
     ------
     ValueError
     """
-    if path.suffix in _OTHERS:
-        msg = f"{path} ends in {path.suffix!r}, expected the name of an HDF5 file, such as {path.stem}.h5"
+    if path.suffix.lower() in _OTHERS:
+        msg = (
+            f"{path} ends in {path.suffix!r}, expected the name of an HDF5 file, such as {path.stem}.h5; for other"
+            " formats use js.save or jamshape export afterwards"
+        )
         raise ValueError(msg)
 
 

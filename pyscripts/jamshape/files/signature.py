@@ -44,6 +44,9 @@ def format_of(path: PathLike) -> str:
     OSError
         If it cannot be read.
     """
+    if Path(path).is_dir():
+        msg = f"{path} is a folder, expected a file; give the name of a file in it"
+        raise IsADirectoryError(msg)
     with Path(path).open("rb") as file:
         head = file.read(_LONGEST)
     found = "" if head else EMPTY

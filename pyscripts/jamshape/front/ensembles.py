@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from jamshape.arguments import checked
-from jamshape.checks import require_stated
+from jamshape.checks import require_folder, require_stated
 from jamshape.front.ensemble_file import EnsembleFile
 from jamshape.front.progress import place
 from jamshape.front.recorded import recorded
@@ -83,6 +83,7 @@ def ensemble(
     for seed in seeds:
         require_stated(seed=seed)
     if folder is not None:
+        require_folder(Path(folder))
         Path(folder).mkdir(parents=True, exist_ok=True)
     at = place(file, "ensemble.h5")
     kept = None if folder is None else Path(folder).absolute()

@@ -125,7 +125,6 @@ class Modes(ModeTable):
             If the file exists and holds anything else, such as the packing.
         """
         read = [self.packing.file] if self.packing and self.packing.file else []
-        require_hdf5_name(Path(path))
         require_modes_file(Path(path), read)
         write_modes(path, self, self.about, vectors=vectors, packing=self.packing)
 
@@ -160,6 +159,7 @@ def require_modes_file(out: Path, read: Sequence[Path] = ()) -> None:
     ------
     ValueError
     """
+    require_hdf5_name(out)
     require_other_file(out, read)
     if out.exists() and not holds_modes(out):
         msg = f"{out} exists and holds no modes, expected another output file; choose one or remove it"
@@ -181,7 +181,7 @@ def modes(
 
     Parameters
     ----------
-    packing : Packing or path
+    packing : Packing, run or path
         Packing at a minimum of its energy, as from `make_packing` or `minimise`, or anything that `load` reads, of which the
         last frame is taken; its law stays.
     lowest : int, optional

@@ -14,7 +14,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from jamshape.checks import require_one_process
+from jamshape.checks import require_no_folder, require_one_process
+from jamshape.files.disk import require_hdf5_name
 from jamshape.recording.driver import Told
 
 _Step = TypeVar("_Step")
@@ -194,11 +195,19 @@ class Place(NamedTuple):
 
 
 def place(file: str | Path | None, name: str) -> Place:
-    """Return the place of a file; without one, in a temporary folder removed with the result."""
+    """Return the place of an H5MD file; without one, in a temporary folder removed with the result.
+
+    Raises
+    ------
+    ValueError
+        If the file has the suffix of another format, or is a folder.
+    """
     if file is None:
         folder = Folder()
         return Place(folder.path / name, folder)
     require_one_process()
     path = Path(file)
+    require_hdf5_name(path)
+    require_no_folder(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     return Place(path)
