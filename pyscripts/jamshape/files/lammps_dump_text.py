@@ -28,7 +28,7 @@ from jamshape.files.lammps_columns import (
     digits_of,
     round_columns,
 )
-from jamshape.files.meaning import Said
+from jamshape.files.meaning import PLANE, Said
 from jamshape.packing import Box, Lengths, cuboid_around
 from jamshape.packing.columns import joined
 
@@ -63,8 +63,8 @@ def dump_frame(lines: TextIO, *, is_first: bool) -> Frame:
     if rest := lines.readline().strip():
         msg = f"a line reads {rest!r}, expected an 'ITEM:' line of an atom dump"
         raise ValueError(msg)
-    names = _plain_names(title.split()[2:])
     box = _dump_bounds(items["BOX BOUNDS"])
+    names, rows = _with_z(_plain_names(title.split()[2:]), rows, box[0])
     columns, others = _dump_columns(names, rows)
     place = next(names for names in POSITIONS if set(names) <= set(columns))
     said = Said(is_later=True)
@@ -73,6 +73,18 @@ def dump_frame(lines: TextIO, *, is_first: bool) -> Frame:
     step, time = int(items["TIMESTEP"][1]), float(items.get("TIME", ["", "0"])[1])
     boundary = items["BOX BOUNDS"][0]
     return Frame(_placed(columns, place, box), *box, said, step, time, joined(others), boundary)
+
+
+def _with_z(names: list[str], rows: list[str], bounds: FloatArray) -> tuple[list[str], list[str]]:
+    """Add z = 0 and its image where a dump of a box in the plane leaves them out."""
+    known = set(names)
+    if (bounds[2] != PLANE).any() or any(set(place) <= known for place in POSITIONS):
+        return names, rows
+    flat = [
+        place for place in (*POSITIONS, IMAGE) if {*place[:2]} <= known and place[2] not in known
+    ]
+    values = "".join(" 0.5" if place in POSITIONS[2:] else " 0" for place in flat)
+    return [*names, *(place[2] for place in flat)], [f"{row.rstrip()}{values}" for row in rows]
 
 
 def _placed(

@@ -17,6 +17,7 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.files.disk import PathLike
 from jamshape.packing import Packing
+from jamshape.packing.given import as_floats
 from jamshape.packing.rotation import product
 from jamshape.shapes.shape import Interaction, Shape, stiffness_text
 from jamshape.shapes.table import SHAPES, Fitted, fitted, shape_named
@@ -158,6 +159,9 @@ def meaning_of(path: PathLike, there: Geometry, said: Said, wanted: Wanted) -> M
     if not len(there.position):
         msg = "packing has no particles, expected at least one"
         raise ValueError(msg)
+    for lengths in ("position", "diameters"):
+        values = getattr(there, lengths)
+        as_floats(lengths, values, values.shape)  # refuses NaN, before anything is decided by it
     dimension, why = _dimension(there, wanted.dimension or said.dimension)
     name = wanted.shape or said.shape
     able = [

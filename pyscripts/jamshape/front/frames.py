@@ -9,8 +9,9 @@ from typing import overload
 
 import numpy as np
 
-from jamshape.arguments import checked
+from jamshape.arguments import ArgumentTypeError, checked
 from jamshape.arrays import FloatArray, IntArray
+from jamshape.checks import said
 from jamshape.files.disk import named
 from jamshape.files.frames import row_of
 from jamshape.files.h5md import FileFormatError, read_attributes, read_clock, read_packings
@@ -69,7 +70,10 @@ class Frames(Sequence[Packing]):
     def __getitem__(self, frame: int | slice) -> Packing | Frames:
         if isinstance(frame, slice):
             return Frames(self.path, self._clock, self._read, self._rows[frame])
-        row = self._rows[row_of(frame, len(self), self.path)]
+        if isinstance(frame, bool | np.bool_) or not hasattr(frame, "__index__"):
+            msg = f"frames are looked up by {said(frame)}, expected a whole number or a slice, such as 0 or [2:10:2]"
+            raise ArgumentTypeError(msg)
+        row = self._rows[row_of(int(frame), len(self), self.path)]
         return next(self._read(range(row, row + 1)))
 
     def __iter__(self) -> Iterator[Packing]:

@@ -58,7 +58,12 @@ def test_frames_are_a_sequence(path, sequence):
     for wrong in (7, -8):
         with pytest.raises(ValueError, match=f"has 7 frames, expected frame {wrong} to be one"):
             frames[wrong]
-    np.testing.assert_array_equal(frames[3].position, sequence[3].position)
+    for wrong in ([0, 1], 1.0, True, "0"):
+        with pytest.raises(
+            TypeError, match=r"^frames are looked up by .*, expected a whole number or"
+        ):
+            frames[wrong]
+    np.testing.assert_array_equal(frames[np.int64(3)].position, sequence[3].position)
     again = pickle.loads(pickle.dumps(frames))
     assert [p.step for p in again] == frames.steps.tolist()
     assert js.load(path, -1, shape=RODS).step == 18
@@ -312,6 +317,38 @@ def test_discs_by_their_diameter(tmp_path, names, row):
     found = js.load(tmp_path / "a.dump", shape=RODS)
     np.testing.assert_array_equal(found.diameters, 1.0)
     assert list(found.columns) == names.split()[1:]
+
+
+@pytest.mark.parametrize(
+    ("names", "rows"),
+    [
+        ("x y", ("3.0 2.0", "4.0 3.0")),
+        ("x y ix iy", ("3.0 2.0 1 0", "4.0 3.0 0 -2")),
+        ("xu yu", ("11.0 2.0", "4.0 -13.0")),
+        ("xs ys", ("0.375 0.25", "0.5 0.375")),
+        ("xsu ysu", ("1.375 0.25", "0.5 -1.625")),
+    ],
+)
+def test_a_dump_of_the_plane_needs_no_z(tmp_path, names, rows):
+    text = DUMP.format("pp pp pp", "diameter", "1", "1").replace("0 9", "0 8")
+    for old, new in zip(("x y z", "3.0 2.0 0", "4.0 3.0 0"), (names, *rows), strict=True):
+        text = text.replace(old, new)
+    (tmp_path / "a.dump").write_text(text)
+    found = js.load(tmp_path / "a.dump", shape=RODS).sorted_by_id()
+    assert found.dimension == 2
+    np.testing.assert_array_equal(found.position, [[4, 3], [3, 2]])
+    if "i" in names or "u" in names:
+        np.testing.assert_array_equal(found.image, [[0, -2], [1, 0]])
+    (tmp_path / "a.dump").write_text(text.replace("-0.5 0.5", "-4 4"))
+    with pytest.raises(FileFormatError, match=r"columns '(x y )?z' are missing"):
+        js.load(tmp_path / "a.dump", shape=RODS)
+
+
+def test_nan_is_said_whatever_the_digits(tmp_path):
+    text = DUMP.format("pp pp pp", "diameter", "1", "1").replace("3.0 2.0", "3.12345 nan")
+    (tmp_path / "a.dump").write_text(text)
+    with pytest.raises(FileFormatError, match="position holds NaN or infinity, expected finite"):
+        js.load(tmp_path / "a.dump", shape=RODS)
 
 
 def test_open_boundaries_are_served_where_nothing_reaches_across(tmp_path):
