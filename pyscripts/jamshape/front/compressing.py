@@ -206,7 +206,7 @@ def slow_compress(
         Final pressure: stop also when it is reached.
     seed : int, optional
         Random seed of the start; 1 by default.
-    start : Packing or path, optional
+    start : Packing, run or path, optional
         Initial packing, or a file that `load` reads, whose last frame to start from.
     method : {"tr-bdf2", "sdirk2"}
         Method of the implicit steps.

@@ -197,7 +197,7 @@ def energy(
 
     Parameters
     ----------
-    packing : Packing or path
+    packing : Packing, run or path
         Packing, or any file that `jamshape.load` reads, of which the last frame is taken; its law stays.
     hessian : bool
         Also assemble the matrix of second derivatives.

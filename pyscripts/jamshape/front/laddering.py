@@ -36,7 +36,7 @@ def ladder(
 
     Parameters
     ----------
-    packing : Packing or path
+    packing : Packing, run or path
         Packing, or a file that `load` reads, whose last frame to take.
     u0 : sequence of float, [energy / length^D], optional
         Energy densities, in the order in which to reach them.

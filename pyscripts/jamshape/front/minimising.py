@@ -45,7 +45,7 @@ def minimise(
 
     Parameters
     ----------
-    packing : Packing or path
+    packing : Packing, run or path
         Any state, or a file that `load` reads, of which the last frame is taken.
     u0, pressure, phi, box, accuracy
         Target, and how the box yields, as in `make_packing`; without a target the box is "fixed".

@@ -24,6 +24,9 @@ from jamshape.drawing.colors import color_of
 from jamshape.drawing.movie import Movie, Shot, require_movie
 from jamshape.drawing.packing import Look
 from jamshape.drawing.text import scientific
+from jamshape.files.signature import HDF5, format_of
+from jamshape.front.files import load
+from jamshape.front.frames import Frames, frames
 from jamshape.front.modes import Modes
 from jamshape.front.run import (
     CyclicShearFile,
@@ -49,7 +52,7 @@ _USUAL = 0.5  # amplitude
 
 @checked
 def animate(
-    thing: Recorded | Modes | Sequence[Packing],
+    thing: Recorded | Modes | Sequence[Packing] | str | Path,
     mode: int | str | Path | None = None,
     file: str | Path | None = None,
     *,
@@ -66,8 +69,8 @@ def animate(
 
     Parameters
     ----------
-    thing : run, Modes or sequence of Packing
-        A run has its own frames; packings have the same dimension.
+    thing : run, Modes, sequence of Packing, or path
+        A run has its own frames, and so does a file that `load` reads; packings have the same dimension.
     mode : int, optional
         Row of the mode; left out for anything else, so that the file comes next.
     file : path, optional
@@ -117,6 +120,8 @@ def animate(
     require_stated(dpi=dpi)
     color = color_of(color or "kind")
     shots: Any
+    if isinstance(thing, str | Path):
+        thing = _opened(Path(thing))
     if isinstance(thing, Modes):
         require_no_effect("mode", mode, every=every)
         shots = _swinging(thing, mode, amplitude)
@@ -131,6 +136,12 @@ def animate(
         return movie
     movie.save(Path(file))
     return None
+
+
+def _opened(path: Path) -> Recorded | Modes | Frames:
+    """Open a file for a movie: a run, modes, or the frames of any other one."""
+    found = load(path) if format_of(path) == HDF5 else None
+    return frames(path) if found is None or isinstance(found, Packing) else found
 
 
 class _Frames:
@@ -148,18 +159,29 @@ class _Frames:
         if not self._rows:
             msg = "no packings were given, expected one or more"
             raise ValueError(msg)
+        self._dimension = self._packing(0).dimension
 
     def __len__(self) -> int:
         return len(self._rows)
 
-    def __getitem__(self, k: int) -> Shot:
-        row = self._rows[k]
+    def _packing(self, row: int) -> Packing:
         packing = (
             self._thing.packing(row) if isinstance(self._thing, Recorded) else self._thing[row]
         )
         if not isinstance(packing, Packing):
             msg = f"thing has {said(packing)} in it, expected a packing in each frame"
             raise ArgumentTypeError(msg)
+        return packing
+
+    def __getitem__(self, k: int) -> Shot:
+        row = self._rows[k]
+        packing = self._packing(row)
+        if packing.dimension != self._dimension:
+            msg = (
+                f"thing has packings in {self._dimension}D and in {packing.dimension}D, expected one dimension; make a"
+                " movie of each"
+            )
+            raise ValueError(msg)
         where = next((of for kind, of in _WHERE.items() if isinstance(self._thing, kind)), _where)
         phi = rf"$\phi={packing.phi:.5f}$"
         return Shot.of(Contacts.of(packing), f"{phi}    {where(self._thing, row, packing)}")

@@ -16,9 +16,9 @@ def nonaffine(first: Held, second: Held, *, neighbours: float | None = None) -> 
 
     Parameters
     ----------
-    first : Packing or path
+    first : Packing, run or path
         Reference state. Of a file that `jamshape.load` reads, the last frame is taken.
-    second : Packing or path
+    second : Packing, run or path
         Another state of the same particles, matched by their IDs, with any box and tilt. The map of the box is the
         smaller one where tilts may have flipped, so that tilts should change by less than half an edge.
     neighbours : float, [length], optional

@@ -92,7 +92,7 @@ def shear(
         this pressure relaxes, in about k_d d^2 / p.
     seed : int, optional
         Random seed of the start; 1 by default.
-    start : Packing or path, optional
+    start : Packing, run or path, optional
         Initial packing, or a file that `load` reads, whose last frame to start from, at its own packing fraction.
     sides : int
         Bonds of a side-to-side contact of rods, 1 or 2.
@@ -223,7 +223,7 @@ def cyclic_shear(
         Time in which the height of the box relaxes, with a pressure, as in `shear`.
     seed : int, optional
         Random seed of the start; 1 by default.
-    start : Packing or path, optional
+    start : Packing, run or path, optional
         Initial packing, at its own packing fraction; the last frame of a file.
     sides : int
         Bonds of a side-to-side contact of rods, 1 or 2.
@@ -353,7 +353,7 @@ def quasistatic_shear(
         Largest net force and torque of a particle over the mean bond force.
     seed : int, optional
         Random seed of the start; 1 by default.
-    start : Packing or path, optional
+    start : Packing, run or path, optional
         Initial packing, or a file that `load` reads, whose last frame to start from, at its own packing fraction and in its own
         box, also a tilted one, where the strain is 0.
     frames : int

@@ -95,7 +95,10 @@ class ModeTable:
     attributes: dict[str, Any]
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """Return a column by name."""
+        """Return a column by name; raises KeyError, with the names of all, if there is none."""
+        if name not in self.columns:
+            msg = f"{name} is not a column of modes, expected one of {', '.join(self.columns)}"
+            raise KeyError(msg)
         return self.columns[name]
 
     def __len__(self) -> int:

@@ -42,6 +42,15 @@ def test_a_file_has_the_energy_of_its_packing_under_its_own_law(packing, tmp_pat
         js.energy(packing, rotation="degree")
 
 
+def test_a_run_stands_for_its_last_packing(packing):
+    run = js.ladder(packing, u0=[1e-7], progress=False)
+    assert js.energy(run).U == js.energy(run.packing()).U != js.energy(packing).U
+    assert js.modes(run).omega.tolist() == js.modes(run.packing()).omega.tolist()
+    assert js.minimise(run, progress=False).u == pytest.approx(1e-7, rel=1e-6)
+    assert js.ladder(run, u0=[1e-6], progress=False).values[0] == pytest.approx(1e-7, rel=1e-6)
+    assert np.all(js.nonaffine(run, run.packing()).displacement == 0)
+
+
 def test_the_energy_agrees_with_the_packing(packing):
     e = js.energy(packing)
     assert e.pressure == pytest.approx(packing.pressure, rel=1e-12)

@@ -43,6 +43,11 @@ def test_translations_are_in_no_statistic(whole):
     assert sum(part["fraction"] for part in parts.values()) == pytest.approx(1, rel=1e-15)
 
 
+def test_an_unknown_column_lists_the_known_ones(whole):
+    with pytest.raises(KeyError, match=r"bandd is not a column of modes, expected one of .*band, "):
+        whole["bandd"]
+
+
 @pytest.mark.parametrize("k", [4, 45, 46])
 def test_few_modes_are_told_like_all(packing, whole, k):
     few = js.modes(packing, lowest=k)

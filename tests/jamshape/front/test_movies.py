@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+import warnings
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import jamshape as js
 from jamshape.commands import main
 from jamshape.drawing.movie import Movie
 from jamshape.files.hdf5 import FileFormatError
+from jamshape.protocols.random_start import random_packing
 
 
 @pytest.fixture(scope="module")
@@ -192,11 +194,26 @@ def test_what_is_wrong_is_said(run, packing, tmp_path, monkeypatch):
         ),
         (lambda: js.animate([]), "no packings were given"),
         (lambda: js.animate([1, 2]), "expected a packing in each frame"),
+        (
+            lambda: js.animate([packing, random_packing(8, 0.1, 1, dimension=3)]),
+            "thing has packings in 2D and in 3D, expected one dimension; make a movie of each",
+        ),
         (lambda: js.animate(3), "expected a run, modes or packings in a row"),
     ):
         with pytest.raises((ValueError, TypeError), match=words):
             call()
     assert not list(tmp_path.glob("x.*"))
+
+
+def test_a_path_is_opened(run, tmp_path):
+    js.save(tmp_path / "aqs.dump", run)
+    with pytest.raises(FileNotFoundError):
+        js.animate(tmp_path / "none.dump")
+    for path in (run.file, str(tmp_path / "aqs.dump")):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of the shape of a dump
+            movie = js.animate(path)
+        assert len(movie) == len(run)
 
 
 def test_the_command_makes_a_movie(run, packing, tmp_path, monkeypatch, capsys):
