@@ -64,6 +64,8 @@ CASES = [
     (f"{COMPRESS} --p 2", "--p does not apply"),
     (f"{COMPRESS} --kind alpha", "a kind is 'alpha'"),
     (f"{COMPRESS} --kind beta=1", "beta is not a parameter"),
+    (f"{COMPRESS} --kind alpha=4,shar=0.5", "shar is not a parameter of spherocylinders, expected one of alpha, size, share, spread"),
+    (f"{COMPRESS} --shape superellipsoid --p 1 --n1 20 --n2 2", "p is given beside n1 and n2, which replace it, expected one or the other; leave p out"),
     (f"{COMPRESS} --kind alpha=1,size=-1", "size is -1"),
     (f"{COMPRESS} --kind alpha=1,size=nan", "size is nan"),
     (f"{COMPRESS} --kind alpha=1,share=0", "share is 0"),

@@ -206,6 +206,7 @@ def cases():
         "ratio and kinds": lambda: js.Spherocylinders(alpha=[1, 2], size_ratio=1.4),
         "dimer": lambda: js.Dimers(alpha=0),
         "p": lambda: js.Superellipsoids(p=1e4),
+        "p and n1": lambda: js.Superellipsoids(p=1, n1=20, n2=2),
         "w1": lambda: js.Superellipsoids(w1=1.5),
         "w2": lambda: js.Superellipsoids(w2=0.5),
         "kind": lambda: js.Kind(size=-1.0),

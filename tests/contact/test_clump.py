@@ -491,6 +491,25 @@ def test_other_discs_are_refused_in_a_sentence(discs):
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda: dimer_discs(-1), "ratio is -1, expected a ratio"),
+        (lambda: dimer_discs(1, -1), "distance is -1, expected a distance"),
+        (lambda: trimer_discs(400), "angle is 400, expected an angle in degrees from 0 to 180"),
+    ],
+)
+def test_discs_of_no_body_are_refused(make, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        make()
+
+
+def test_balls_in_the_plane_are_refused_with_what_to_do():
+    balls = js.Clumps(discs=[[0, 0, 0, 0.5], [0.6, 0, 0, 0.5], [0, 0.6, 0, 0.4]])
+    with pytest.raises(ValueError, match=r"give rows x y r .* or make a packing of dimension 3"):
+        js.make_packing(balls, n=4, progress=False)
+
+
 def test_forms_off_their_centre_are_refused():
     """Files and arrays of other programs: the compiled class takes bodies about their centre only."""
     form = np.array([[0.1, 0.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.5]])

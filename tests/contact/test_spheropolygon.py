@@ -435,8 +435,13 @@ def test_text_files_and_arrays_are_one_input(tmp_path):
     ("corners", "message"),
     [
         ([[0, 0], [1, 0], [1, 1], [0.9, 0.1]], "convex"),
-        ([[0, 0], [1, 0], [2, 0]], "convex"),
-        ([[0, 0], [0, 0], [1, 1]], "convex"),
+        ([[0, 0], [1, 0], [2, 0]], "1 0 on a line with its neighbours, .* leave it out"),
+        (
+            [[0, 0], [1, 0], [1, 0.5], [1, 1]],
+            "1 0.5 on a line with its neighbours, .* leave it out",
+        ),
+        ([[0, 0], [0, 0], [1, 1]], "0 0 twice in a row, expected each corner once"),
+        ([[0, 1], [1, 1], [1, 0], [0, 1]], "0 1 twice in a row, .* the last of a closed ring"),
         ([[0, 0, 0], [1, 0, 0], [1, 1, 0]], "x y of each corner"),
         ("0 0/1 x", "x y of each corner"),
         ("no_such_file.txt", "x y of each corner"),
@@ -448,6 +453,14 @@ def test_other_corners_are_refused_in_a_sentence(corners, message):
         js.Spheropolygons(corners=corners)
     assert "expected" in str(error.value)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("n", [-1, 2, 256])
+def test_regular_polygons_have_three_corners_or_more(n):
+    with pytest.raises(
+        ValueError, match=f"n is {n}, expected a whole number of corners from 3 to 255"
+    ):
+        regular_polygon(n)
 
 
 @pytest.mark.parametrize("rounding", [0.0, -1.0, np.inf, np.nan])

@@ -14,6 +14,7 @@ import numpy as np
 
 from jamshape.arguments import checked
 from jamshape.arrays import FloatArray
+from jamshape.checks import Range, require_in
 from jamshape.shapes.level_set import level_set_mesh
 from jamshape.shapes.mesh import SurfaceMesh, arc
 from jamshape.shapes.principal import Moments, is_principal, principal, rows_of, text_of
@@ -21,6 +22,9 @@ from jamshape.shapes.shape import MOST_NUMBERS, ROUND, FormedShape, Parameter
 from jamshape.shapes.solid import Balls
 
 _WIDTH = 4  # numbers of a disc: x y z r
+_RATIO = Range(1e-6, 1e6, "a ratio")
+_DISTANCE = Range(0.0, 1e6, "a distance")
+_ANGLE = Range(0.0, 180.0, "an angle in degrees")
 _POINT = 1e-9  # radians; where three circles meet, rounding leaves arcs that have no direction
 
 
@@ -111,7 +115,10 @@ class Clump(FormedShape):
             msg = f"form has {columns} columns, expected x y z r of each disc of a clump"
             raise ValueError(msg)
         if dimension == 2 and form[:, 2::_WIDTH].any():
-            msg = "form of a clump in the plane has discs off z = 0, expected all at 0"
+            msg = (
+                "form of a clump in the plane has discs off z = 0, expected all at 0; give rows x y r of discs in the"
+                " plane, since rows x y z r are balls, or make a packing of dimension 3"
+            )
             raise ValueError(msg)
 
     def sizes(
@@ -232,11 +239,18 @@ def dimer_discs(ratio: float = 1.0, distance: float = 1.0) -> FloatArray:
     (2, 3) array of float64
         x y r.
 
+    Raises
+    ------
+    ValueError
+        If the ratio is not positive, or the distance is negative.
+
     Examples
     --------
     >>> dimer_discs(0.5).tolist()
     [[0.0, 0.0, 0.5], [0.75, 0.0, 0.25]]
     """
+    require_in("ratio", ratio, _RATIO)
+    require_in("distance", distance, _DISTANCE)
     return np.array([[0.0, 0.0, 0.5], [distance * (1 + ratio) / 2, 0.0, ratio / 2]])
 
 
@@ -254,11 +268,17 @@ def trimer_discs(angle: float = 60.0) -> FloatArray:
     (3, 3) array of float64
         x y r.
 
+    Raises
+    ------
+    ValueError
+        If the angle is not from 0 to 180.
+
     Examples
     --------
     >>> trimer_discs(180)[:, 0].round(6).tolist()
     [0.0, -1.0, 1.0]
     """
+    require_in("angle", angle, _ANGLE)
     half = np.deg2rad(angle) / 2
     x, y = np.sin(half), np.cos(half)
     return np.array([[0.0, 0.0, 0.5], [-x, -y, 0.5], [x, -y, 0.5]])

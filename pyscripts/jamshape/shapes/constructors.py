@@ -12,11 +12,10 @@ from numpy.typing import ArrayLike
 
 from jamshape.arguments import checked
 from jamshape.arrays import real_numbers
-from jamshape.shapes.particles import Kind, Particles
-from jamshape.shapes.shape import Parameter, Shape
+from jamshape.shapes.particles import OF_A_KIND, Kind, Particles
+from jamshape.shapes.shape import HARMONIC, Parameter, Shape
 
 _TABLE = 2  # dimensions
-_OF_KINDS = ("size", "share", "spread")
 
 _TEXT = """{about}
 
@@ -65,12 +64,9 @@ def constructor(shape: Shape) -> Callable[..., Particles]:
 
     def make(*args: ArrayLike, **kwargs: ArrayLike) -> Particles:
         given = signature.bind(*args, **kwargs)
-        given.apply_defaults()
-        numbers = dict(given.arguments)
-        law = numbers.pop("law")
-        return _particles(shape, numbers, numbers.pop("size_ratio"), numbers.pop("kinds")).under(
-            law
-        )
+        numbers = dict(given.arguments)  # without defaults, which contradict nothing
+        law, ratio = numbers.pop("law", HARMONIC), numbers.pop("size_ratio", None)
+        return _particles(shape, numbers, ratio, numbers.pop("kinds", {})).under(law)
 
     make.__signature__ = signature  # type: ignore[attr-defined]
     make.__name__ = make.__qualname__ = shape.compiled_name
@@ -141,8 +137,9 @@ def _particles(
 ) -> Particles:
     """Make particles from numbers, or kinds from arrays."""
     for name in kinds:
-        if name not in _OF_KINDS:
-            expected = ", ".join((*parameters, "size_ratio", *_OF_KINDS))
+        if name not in OF_A_KIND:
+            options = [p.option for p in shape.parameters]
+            expected = ", ".join((*options, "size_ratio", *OF_A_KIND))
             msg = f"{name} is unknown for {shape.name}s, expected {expected}"
             raise ValueError(msg)
     texts = {p.option: p for p in shape.parameters if isinstance(p.default, str)}

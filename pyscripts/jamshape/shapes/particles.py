@@ -16,6 +16,9 @@ from jamshape.checks import RANGES, require_in, require_stated
 from jamshape.shapes.shape import HARMONIC, Shape, law_text, power_of
 from jamshape.shapes.table import DEFAULT, shape_named
 
+OF_A_KIND = ("size", "share", "spread")
+"""Numbers of a kind beside the parameters of its shape."""
+
 
 class Sizes(NamedTuple):
     """Shapes of n particles."""
@@ -167,7 +170,10 @@ class Particles:
             raise ValueError(msg)
         big, small = max(k.size for k in kinds), min(k.size for k in kinds)
         require_in("the largest size over the smallest", big / small, RANGES["size_ratio"])
-        full = [Kind(_with_defaults(its, k.parameters), k.size, k.share, k.spread) for k in kinds]
+        full = [
+            Kind(_with_defaults(its, k.parameters, OF_A_KIND), k.size, k.share, k.spread)
+            for k in kinds
+        ]
         told = {"kinds": "; ".join(map(_text, full))}
         return cls(its, _Mixture(its, full), told)
 
@@ -244,9 +250,7 @@ def parse_kind(text: str) -> Kind:
     except ValueError:
         msg = f"a kind is {text!r}, expected numbers by name such as alpha=4,size=1.4,share=0.5"
         raise ValueError(msg) from None
-    own = {
-        name: float(numbers.pop(name)) for name in ("size", "share", "spread") if name in numbers
-    }
+    own = {name: float(numbers.pop(name)) for name in OF_A_KIND if name in numbers}
     return Kind(numbers, **own)
 
 
@@ -267,17 +271,27 @@ def _text(kind: Kind) -> str:
     )
 
 
-def _with_defaults(shape: Shape, parameters: Mapping[str, Any]) -> dict[str, Any]:
+def _with_defaults(
+    shape: Shape, parameters: Mapping[str, Any], others: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Complete and read the parameters of a shape, which may be given by their options; `others` are expected beside them."""
     known = {p.name: p.default for p in shape.parameters}
     by_option = {p.option: p.name for p in shape.parameters}
     given = {by_option.get(name, name): value for name, value in parameters.items()}
     for name in given:
         if name not in known:
-            msg = f"{name} is not a parameter of {shape.name}s, expected {', '.join(known)}"
+            expected = ", ".join([*by_option, *others])
+            msg = f"{name} is not a parameter of {shape.name}s, expected one of {expected}"
             raise ValueError(msg)
     chosen = known | given
     present = (p for p in shape.parameters if p in shape.needed or chosen[p.name] is not None)
-    return shape.reduced({p.name: p.read(chosen[p.name]) for p in present})
+    found = shape.reduced({p.name: p.read(chosen[p.name]) for p in present})
+    for p in shape.parameters:
+        if p.name in given and given[p.name] is not None and p.name not in found:
+            replacing = " and ".join(q.option for q in shape.parameters if q not in shape.needed)
+            msg = f"{p.option} is given beside {replacing}, which replace it, expected one or the other; leave {p.option} out"
+            raise ValueError(msg)
+    return found
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numpy as np
 
 from jamshape.arguments import checked
 from jamshape.arrays import FloatArray
-from jamshape.checks import Range
+from jamshape.checks import Range, require_in
 from jamshape.shapes.mesh import SurfaceMesh, arc
 from jamshape.shapes.principal import principal, rows_of, text_of
 from jamshape.shapes.shape import (
@@ -26,6 +26,9 @@ from jamshape.shapes.shape import (
     in_name,
 )
 from jamshape.shapes.solid import RoundedPolygon
+
+_STRAIGHT = 1e-9  # sine of the angle by which a side turns from the one before
+_CORNERS = Range(3, 255, "corners", whole=True)
 
 
 class Corners(Parameter):
@@ -45,8 +48,27 @@ class Corners(Parameter):
         step = np.roll(rows, -1, axis=0) - rows
         turn = step[:, 0] * np.roll(step[:, 1], -1) - step[:, 1] * np.roll(step[:, 0], -1)
         rows = rows[::-1] if (turn < 0).all() and len(rows) > 2 else rows
+        if len(rows) > 1 and not ((turn > 0).all() or (turn < 0).all()):
+            _require_corners(rows, step, turn)
         _placed(rows, 1.0)
         return text_of(rows)
+
+
+def _require_corners(rows: FloatArray, step: FloatArray, turn: FloatArray) -> None:
+    """Refuse repeated corners, and those on a line with their neighbours."""
+    length = np.linalg.norm(step, axis=1)
+    for k in np.flatnonzero(length == 0):
+        x, y = rows[k]
+        msg = (
+            f"corners has {x:g} {y:g} twice in a row, expected each corner once; leave one out, such as the last of"
+            " a closed ring"
+        )
+        raise ValueError(msg)
+    is_straight = np.abs(turn) <= _STRAIGHT * length * np.roll(length, -1)
+    for k in np.flatnonzero(is_straight) if len(rows) > 2 else ():
+        x, y = rows[(k + 1) % len(rows)]
+        msg = f"corners has {x:g} {y:g} on a line with its neighbours, expected corners of a convex polygon; leave it out"
+        raise ValueError(msg)
 
 
 def _placed(rows: FloatArray, rounding: float) -> FloatArray:
@@ -66,17 +88,23 @@ def regular_polygon(n: int) -> FloatArray:
     Parameters
     ----------
     n : int
-        Number of corners, at least 3.
+        Number of corners, from 3 to 255.
 
     Returns
     -------
     (n, 2) array of float64
+
+    Raises
+    ------
+    ValueError
+        If it is out of this range.
 
     Examples
     --------
     >>> regular_polygon(4).round(3).tolist()
     [[0.5, -0.5], [0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5]]
     """
+    require_in("n", n, _CORNERS)
     half = np.pi / n
     turns = arc(-half, 2 * np.pi - half, n + 1)[:-1]
     return np.asarray(turns / (2 * np.sin(half)))

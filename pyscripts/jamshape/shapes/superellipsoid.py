@@ -118,7 +118,7 @@ class Superellipsoid(Shape):
             msg = f"{given[0]} is given without {other}, expected both, or p alone"
             raise ValueError(msg)
         if np.any(np.not_equal(parameters.get("exponent", 1.0), 1.0)):
-            msg = "p is given beside n1 and n2, which replace it; leave p out"
+            msg = "p is given beside n1 and n2, which replace it, expected one or the other; leave p out"
             raise ValueError(msg)
         return {name: value for name, value in parameters.items() if name != "exponent"}
 

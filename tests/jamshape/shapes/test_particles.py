@@ -63,7 +63,10 @@ def test_options_name_particles_as_python_does():
     ("options", "sentence"),
     [
         (("--p", "2"), "--p does not apply to spherocylinders, expected --alpha"),
-        (("--kind", "beta=2"), "beta is not a parameter of spherocylinders, expected alpha"),
+        (
+            ("--kind", "beta=2"),
+            "beta is not a parameter of spherocylinders, expected one of alpha, size",
+        ),
         (("--kind", "alpha=2", "--alpha", "3"), "--kind excludes --size-ratio and a shape"),
         (("--kind", "alpha=2,share=0"), r"share is 0\.0, expected a share from 1e-06 to 1e\+06"),
         (("--kind", "alpha=2,spread=-1"), r"spread is -1\.0, expected a spread from 0 to 1"),
