@@ -415,10 +415,11 @@ template <class Model> class PairContactOf : public PairContact {
     const Vec<3> along = in_space<D>(load.force);
     const double *const x = atom->x[i], *const y = atom->x[j];
     const double z = D == 2 ? 0.0 : x[2] - y[2];
-    // LAMMPS sums the product of its last and its first vector, xx to yz. A tilt xy of the box moves
-    // x by y, so that its stress is r_y f_x. It differs from r_x f_y by torques: hence the swap.
-    ev_tally_xyz(i, j, atom->nlocal, force->newton_pair, load.energy, 0.0, x[0] - y[0],
-                 x[1] - y[1], z, along[0], along[1], along[2]);
+    // LAMMPS sums the product of its last and its first vector, xx to yz. A tilt xy of the box
+    // moves x by y, so that its stress is r_y f_x. It differs from r_x f_y by torques: hence the
+    // swap.
+    ev_tally_xyz(i, j, atom->nlocal, force->newton_pair, load.energy, 0.0, x[0] - y[0], x[1] - y[1],
+                 z, along[0], along[1], along[2]);
   }
 
   /* ----------------------------------------------------------------------

@@ -161,7 +161,9 @@ def test_a_box_that_tilts_relaxes_to_a_pressure(name, tmp_path):
         for _ in range(4):  # line searches end at absolute changes of the energy
             session.commands("minimize 0.0 0.0 3000 30000")
         session.commands("run 0")
-        keys = ("pxx", "pyy", "pxy") if name == "rods" else ("pxx", "pyy", "pzz", "pxy", "pxz", "pyz")
+        keys = (
+            ("pxx", "pyy", "pxy") if name == "rods" else ("pxx", "pyy", "pzz", "pxy", "pxz", "pyz")
+        )
         found = [session.lmp.get_thermo(key) for key in keys]
     wanted = [1e4 * (key[1] == key[2]) for key in keys]
     np.testing.assert_allclose(found, wanted, rtol=0, atol=10.0)
