@@ -146,7 +146,6 @@ void ComputePacking::compute_vector()
   compute_contacts(bonds);
 }
 
-/// The sum of all contact torques on this rank's particles, or of this rank's contacts.
 void ComputePacking::compute_density_and_stress()
 {
   const int d = domain->dimension;

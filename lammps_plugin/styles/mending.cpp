@@ -1,5 +1,7 @@
 #include "mending.h"
 
+#include "compat.h"
+
 #include "atom.h"
 #include "error.h"
 #include "force.h"
@@ -90,8 +92,9 @@ void mend(LAMMPS_NS::LAMMPS *lmp)
   mend_thermo(lmp);
   mend_pair(lmp);
   if (lmp->atom->avec == nullptr) lmp->atom->create_avec("atomic", 0, nullptr, 1);
-  for (int i = lmp->modify->nfix - 1; i >= 0; --i)
-    if (lmp->modify->fix[i] == nullptr) lmp->modify->delete_fix(i);
+  const std::vector<LAMMPS_NS::Fix *> fixes = compat::fixes(lmp->modify);
+  for (int i = static_cast<int>(fixes.size()) - 1; i >= 0; --i)
+    if (fixes[i] == nullptr) lmp->modify->delete_fix(i);
 }
 
 }  // namespace jamshape
