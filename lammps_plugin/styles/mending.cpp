@@ -1,8 +1,7 @@
 #include "mending.h"
 
-#include "compat.h"
-
 #include "atom.h"
+#include "compat.h"
 #include "error.h"
 #include "force.h"
 #include "modify.h"
