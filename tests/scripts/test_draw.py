@@ -76,7 +76,9 @@ def test_user_errors_are_one_sentence(problem, tmp_path):
     path = tmp_path / "packing.h5"
     write_packing(path, packing())
     assert "No such file" in problem(SCRIPT, path, "--out", tmp_path / "none" / "out.png")
-    assert "not supported" in problem(SCRIPT, path, "--out", tmp_path / "out.nonsense")
+    assert "expected the name of a picture" in problem(
+        SCRIPT, path, "--out", tmp_path / "out.nonsense"
+    )
     said = problem(SCRIPT, path, "--color", "C4", "--out", out)
     assert (
         "particles are in 2D and coloured by C4 (cubatic), expected S2 (nematic) or S4 (tetratic) there"

@@ -74,7 +74,9 @@ def test_user_errors_are_one_sentence(problem, tmp_path, script):
     assert str(text) in problem(script, text, "--out", out)
     run_file = compression(tmp_path / "run.h5")
     assert "No such file" in problem(script, run_file, "--out", tmp_path / "none" / "out.png")
-    assert "not supported" in problem(script, run_file, "--out", tmp_path / "out.nonsense")
+    assert "expected the name of a picture" in problem(
+        script, run_file, "--out", tmp_path / "out.nonsense"
+    )
     path = tmp_path / "packing.h5"
     write_packing(path, packing())
     assert "expected a run of compress.py" in problem(script, path, "--out", out)
