@@ -248,12 +248,10 @@ void jamshape_register(void *handle)
   add_styles(lmp, AddToStyles{lmp});
 }
 
-/// Adds the styles again if `clear` has removed them; returns whether it has.
-int jamshape_register_again(void *handle)
+/// Adds the styles again if `clear` has removed them.
+void jamshape_register_again(void *handle)
 {
-  if (lammps_has_style(handle, "fix", "overdamped/affine")) return 0;
-  jamshape_register(handle);
-  return 1;
+  if (!lammps_has_style(handle, "fix", "overdamped/affine")) jamshape_register(handle);
 }
 
 /// Makes a LAMMPS usable after an error in a command.

@@ -252,7 +252,8 @@ class Session:
             raise
         finally:
             # After `clear`, which may also come within a deck.
-            if self._library.jamshape_register_again(lmp.lmp):
+            self._library.jamshape_register_again(lmp.lmp)
+            if not lmp.extract_setting("box_exist"):
                 self._like = self._law = None
 
     def left_out(self) -> str:
@@ -272,7 +273,6 @@ class Session:
         """
         self._require_no_box()
         self.commands(f"{_ATOMS}\ndimension {packing.dimension}")
-        self._like = packing
         one = packing.with_(law=Interaction())  # set by `interact`
         types = one.shape.style(one, one.law).types
         with tempfile.TemporaryDirectory() as folder:
@@ -285,6 +285,7 @@ class Session:
             with path.open("rb") as file:
                 self.commands(f"read_data /dev/fd/{file.fileno()}")
         self.commands(_POSES)
+        self._like = packing
 
     def _require_no_box(self) -> None:
         if self.lmp.extract_setting("box_exist"):
@@ -297,11 +298,11 @@ class Session:
     def load_restart(self, restart: bytes, like: Packing | None = None) -> None:
         """Load the content of a restart file into a fresh instance, with the particles of a packing."""
         self._require_no_box()
-        self._like = like
         with _in_memory() as file:
             file.write(restart)
             file.flush()
             self.commands(f"{_ATOMS}\nread_restart /dev/fd/{file.fileno()}\n{_POSES}")
+        self._like = like
 
     def restart(self) -> bytes:
         """Return the content of a restart file of the present state, which LAMMPS wraps and sorts."""
