@@ -5,8 +5,8 @@
 Four panels: phi_J with the maximum of others and the random contact law of long rods; z beside 10 and beside 8 + 2 f_0
 (Heussinger, arXiv 2004.13460), with f_0 the fraction of rods with contacts at both ends; fractions of the contacts
 by ends, and f_0; rattlers. Grazing bonds, below 1e-6 of the mean force, do not count. The random contact law takes rods that touch
-for uncorrelated ones that overlap: z is then the number of rods in the volume that a rod excludes (Onsager 1949; Wouterse, Luding & Philipse 2009). The last line of standard output is one JSON object with averages and their
-standard errors; peak has the largest phi_J and its alpha, with half the mean distance of the next ones as its error; as_many
+for uncorrelated ones that overlap: z is then the number of rods in the volume that a rod excludes (Onsager 1949;
+Wouterse, Luding & Philipse 2009). The last line of standard output is one JSON object with averages and their standard errors; peak has the largest phi_J and its alpha, with half the mean distance of the next ones as its error; as_many
 counts the packings of --modes with as many zero modes as rods that have contacts at neither end, which slide freely.
 """
 

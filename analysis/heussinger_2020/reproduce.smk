@@ -15,8 +15,8 @@ FILES = add_sweep(
     AT["chunk"],
 )
 OF_MODES = tuple(f"rods_alpha{alpha:g}_" for alpha in AT["mode_alphas"])
-LONG = {name: paths for name, paths in FILES.items() if name.startswith(OF_MODES)}
-add_modes("modes", "rods", LONG, " --least-force 1e-6")  # as contacts at ends are counted
+WITH_MODES = {name: paths for name, paths in FILES.items() if name.startswith(OF_MODES)}
+add_modes("modes", "rods", WITH_MODES, " --least-force 1e-6")  # as contacts at ends are counted
 figure("end_contacts", "heussinger_2020/end_contacts.py", ["packings/rods --modes modes/modes"], ["rods", "modes"])
 LONGEST = [paths[0] for paths in FILES.values() if "seed1." in paths[0]][-1:]
 figure("packing", "draw.py", (), ["rods"], draws=f"jamshape draw {words(LONGEST)} --out figures/packing.png")

@@ -6,7 +6,8 @@ Each packing is made at the lowest pressure, in a box that changes its volume on
 other, as by Zhang, VanderWerf, Li, Zhang, Shattuck & O'Hern, Phys. Rev. E 104, 014901 (2021). G is the change of the shear stress
 under simple shear at a fixed volume. Averages are over all packings, over those of positive G only, and over all packings and all directions of
 shear. Fits are weighted by the standard errors; the errors of beta and G_0 are those of the bootstrap over packings. Finished packings are kept in --runs: a command that is stopped and
-repeated goes on. With series.csv of sample_tables.py in place of that folder it draws from the table. The last line of standard output is one JSON object.
+repeated goes on. With series.csv of sample_tables.py in place of that folder it draws from the table. The last
+line of standard output is one JSON object.
 """
 
 from __future__ import annotations

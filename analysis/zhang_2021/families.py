@@ -2,8 +2,8 @@
 
     python analysis/zhang_2021/families.py --alpha 0 1 --n 64 --samples 50 --runs series --out families.png
 
-Reads what compress.py made, or series.csv of sample_tables.py (--runs). A geometrical family is a packing at the pressures at which its contacts stay the same. As by
-Zhang, VanderWerf, Li, Zhang, Shattuck & O'Hern, Phys. Rev. E 104, 014901 (2021), <G> = <G_f> + <G_r>: G_f begins at <G> of the
+Reads what compress.py made, or series.csv of sample_tables.py (--runs). A geometrical family is a packing at the pressures at
+which its contacts stay the same. As by Zhang, VanderWerf, Li, Zhang, Shattuck & O'Hern, Phys. Rev. E 104, 014901 (2021), <G> = <G_f> + <G_r>: G_f begins at <G> of the
 lowest pressure and grows by the mean of dG/dp along families (trapezoidal rule); changes of contacts contribute the rest, G_r.
 Errors are those of the bootstrap over packings. The last line of standard output is one JSON object.
 """

@@ -104,7 +104,8 @@ def start_below(
 
     Arguments and errors as in `random_packing`.
     """
-    for densest in _DENSEST:
+    room = usual_phi_start(_DENSEST[0], n, seed, particles or Particles.of(), dimension)
+    for densest in (room, *(one for one in _DENSEST if one < room)):
         with suppress(InsertionError):
             return random_packing(n, min(phi, densest), seed, particles, dimension)
     return random_packing(n, min(phi, _LOOSEST), seed, particles, dimension)

@@ -20,6 +20,7 @@ from jamshape.protocols.random_start import (
     InsertionError,
     dilute_packing,
     random_packing,
+    start_below,
     usual_phi_start,
 )
 from jamshape.shapes.particles import Particles, Sizes
@@ -162,6 +163,7 @@ def test_usual_start_has_room_for_long_particles(alpha, n):
         phi = usual_phi_start(0.4, n, seed, mixture, 2)
         assert (phi == 0.4) == (alpha <= 10)
         assert random_packing(n, phi, seed, mixture).n == n
+        assert start_below(0.8, n, seed, mixture).phi == pytest.approx(phi, rel=1e-12)
 
 
 def test_usual_start_of_long_particles_in_3d_is_not_jammed():
