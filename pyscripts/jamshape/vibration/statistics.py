@@ -94,7 +94,8 @@ class Counts(NamedTuple):
     rank: int
     """Rank of H, from the singular values of C."""
     n_self_stress: int
-    """N_c - rank, which is one, and one more for each set of redundant bonds."""
+    """N_c - rank, which is one, and one more for each set of redundant bonds. The one is missing where rods overlap by more than
+    A^2 / d: ends of a contact then share an energy that depends on more than the lengths of its bonds."""
     n_floppy: int
     """Modes but translations that H leaves free."""
     n_grazing: int
