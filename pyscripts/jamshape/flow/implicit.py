@@ -472,7 +472,7 @@ class ImplicitFlow:
         while True:
             trial = self._next_trial(longest)
             if trial.explicit and here is flow._here:
-                here = self._evaluated()
+                here = self._present()
             attempt = self._tried(trial.dt, trial.explicit, here)
             if attempt is None:
                 self._retreat(trial.dt)

@@ -230,3 +230,16 @@ def test_a_rate_that_drives_spines_across_each_other_is_refused():
     sentence = r"spines of particles 1 and 2 cross at phi = .* kappa = 100, expected .* more slowly"
     with pytest.raises(CrossingError, match=sentence):
         ended(packing, Protocol(1e2, 3.0))
+
+
+def test_so_is_one_whose_explicit_steps_do():
+    """The state of the last step is evaluated anew before an explicit one."""
+    before = packing_of(2.0, [[5.0, 5.0], [5.3, 6.2]], [0.0, 1.5], L=6.0)
+    crossed = packing_of(2.0, [[5.0, 5.0], [5.3, 5.2]], [0.0, 1.5], L=6.0)
+    landscape, flow = Landscape(before), Flow(State.of(crossed), steps=1, explicit_left=1)
+    flow._here = landscape.evaluate(State.of(before))
+    flow.velocity, flow.dt = np.zeros(landscape.size), 1.0
+    with pytest.raises(
+        CrossingError, match="cross at phi = .* kappa = 0.01, expected .* more slowly"
+    ):
+        next(compress(landscape, flow, Protocol(1e-2, 3.0)))
