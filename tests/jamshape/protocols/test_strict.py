@@ -116,7 +116,12 @@ def test_strict_packing_has_no_negative_eigenvalue(strict):
 
 @chosen_by_seed
 @pytest.mark.parametrize(
-    ("n", "seed"), [(32, 1), (32, 3), pytest.param(128, 1, marks=pytest.mark.validate)]
+    ("n", "seed"),
+    [
+        (32, 1),
+        (32, 3),
+        pytest.param(128, 1, marks=[pytest.mark.validate, chosen_with_avx512]),
+    ],
 )
 def test_what_is_pushed_by_next_to_nothing_meets_its_wall(n, seed, tmp_path):
     """A rod in a channel is pushed by 1e-9 of the mean force, of N = 128 by less than digits tell."""
