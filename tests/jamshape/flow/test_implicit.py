@@ -240,6 +240,6 @@ def test_so_is_one_whose_explicit_steps_do():
     flow._here = landscape.evaluate(State.of(before))
     flow.velocity, flow.dt = np.zeros(landscape.size), 1.0
     with pytest.raises(
-        CrossingError, match="cross at phi = .* kappa = 0.01, expected .* more slowly"
+        CrossingError, match=r"cross at phi = .* kappa = 0\.01, expected .* more slowly"
     ):
         next(compress(landscape, flow, Protocol(1e-2, 3.0)))
