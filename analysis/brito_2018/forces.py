@@ -4,7 +4,8 @@
 
 The density of small forces f, over their mean, is taken as f^theta. theta is the maximum likelihood of the forces below
 --below, with its error: 1 + theta = 1 / <ln(below / f)>. Of a smooth distribution with a finite P(0) it goes to 0 with the bound,
-in proportion to it; JSON has it for several bounds, and extrapolated from each and half of it to 0. Brito, Ikeda, Urbani, Wyart & Zamponi, PNAS 115, 11736 (2018), state
+in proportion to it; JSON has it for several bounds, and extrapolated from each and half of it to 0. There is a power law if
+theta extrapolated from --below is above 0 by two errors. Brito, Ikeda, Urbani, Wyart & Zamponi, PNAS 115, 11736 (2018), state
 that forces of hypostatic packings follow no power law, so that P(0) is finite and theta 0, unlike those of isostatic
 packings of round particles. Bonds of rattlers and grazing bonds, below 1e-6 of the mean,
 are left out. The last line of standard output is one JSON object.

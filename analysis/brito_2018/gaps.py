@@ -5,7 +5,7 @@
 The gap h of two particles is the swelling at which they touch: of all particles about their centres, by the factor 1 + h. It is
 r / (R_i + R_j) - 1 of discs. Gaps are found as contacts that appear when the particles of a packing swell in small steps, of
 10 % of h. The density of small gaps is taken as h^-gamma, with gamma from those below --below as in forces.py; JSON has it for
-several bounds, and extrapolated. Brito, Ikeda, Urbani, Wyart & Zamponi, PNAS 115, 11736 (2018), state that gaps of hypostatic packings follow no
+several bounds, and extrapolated, which tells whether there is a power law. Brito, Ikeda, Urbani, Wyart & Zamponi, PNAS 115, 11736 (2018), state that gaps of hypostatic packings follow no
 power law, unlike those of isostatic packings of round particles. Rattlers are left out. The last line of standard output is
 one JSON object.
 """

@@ -52,12 +52,16 @@ class Distribution(NamedTuple):
     values: FloatArray
     """(B,) of all packings, ascending."""
     power: float
+    """From the values below a bound."""
     error: float
+    limit: tuple[float, float]
+    """Power extrapolated to a bound of 0, and its error."""
 
     @property
     def has_power(self) -> int:
-        """1 if the power is above 0 by more than two errors."""
-        return int(self.power > SURE * self.error)
+        """1 if the power of the smallest values is above 0 by more than two errors."""
+        power, error = self.limit
+        return int(power > SURE * error)
 
 
 def exponent_of(values: FloatArray, below: float) -> tuple[float, float]:
@@ -139,7 +143,10 @@ def study(options: Namespace, of: Quantity, values_of: Callable[[PackingFile], F
     for system, files in groups.items():
         values = np.sort(np.concatenate([values_of(file) for file in files]))
         Delta = files[0].number("aspect_ratio") - 1
-        found.append(Distribution(system, Delta, values, *power_of(of, values, options.below)))
+        limit = power_of(of, values, options.below, extrapolated)
+        found.append(
+            Distribution(system, Delta, values, *power_of(of, values, options.below), limit)
+        )
     found.sort(key=lambda one: one.Delta)
     title = conditions_text(groups, bars=False)
     save_figure(figure_from(found, of, title, options.below), options.out)

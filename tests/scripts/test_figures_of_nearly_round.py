@@ -8,7 +8,7 @@ import pytest
 from pictures import image
 
 import jamshape as js
-from common.small_values import exponent_of, extrapolated
+from common.small_values import Distribution, exponent_of, extrapolated
 from jamshape.files.ensembles import PackingFile
 
 FOLDER = "brito_2018"
@@ -112,6 +112,17 @@ def test_exponents_are_extrapolated_to_a_bound_of_zero(theta):
     assert below.mean() > theta + 0.07
     assert exponents.mean() == pytest.approx(theta, abs=0.03)
     assert errors.mean() == pytest.approx(exponents.std(), rel=0.15)
+
+
+@pytest.mark.parametrize(("theta", "has_power"), [(0.0, 0), (0.2, 1)])
+def test_a_finite_density_that_rises_is_no_power_law(theta, has_power):
+    rng = np.random.default_rng(2)
+    x = rng.random(40000) ** (1 / (1 + theta))
+    values = np.sort(x[rng.random(40000) < (1 + x) / 2])
+    power, error = exponent_of(values, 0.5)
+    found = Distribution(None, 0.1, values, power, error, extrapolated(values, 0.5))
+    assert power > 2 * error
+    assert found.has_power == has_power
 
 
 def test_powers_of_contacts_are_found(monkeypatch):
