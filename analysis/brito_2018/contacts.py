@@ -118,7 +118,7 @@ def figure_from(
     Delta = np.geomspace(min(one.Delta for one in points), fit_to, 20)
     for name, power in powers.items():
         of = next(one.system for one in points if name_of(one.system) == name)
-        label = rf"{name}: $\Delta^{{{power.x:.2f}\pm{power.x_error:.2f}}}$"
+        label = rf"{name}: $\Delta^{{{power.x:.3f}\pm{power.x_error:.1g}}}$"
         line: dict[str, Any] = {"color": mark(of)["color"], "ls": ":" if of.dimension == 3 else "-"}
         axes.plot(Delta, power.c * Delta**power.x, lw=0.9, label=label, **line)
     axes.plot(Delta, 2.5 * Delta**0.5, label=r"slope of $\Delta^{1/2}$", **PAPER_LINE)

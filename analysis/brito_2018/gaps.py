@@ -13,11 +13,12 @@ one JSON object.
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
-from jamshape.arrays import FloatArray
+from jamshape.arrays import FloatArray, IntArray
 from jamshape.command import parser_of, run
 from jamshape.contacts import Contacts, find_contacts
 from jamshape.files.ensembles import PackingFile
@@ -37,14 +38,38 @@ SWELLINGS = np.geomspace(1e-7, 0.2, 146)
 """From overlaps of packings at u0 = 1e-15, far below the smallest bound."""
 
 
+def rising(count_at: Callable[[int], int], n: int) -> IntArray:
+    """Return n >= 2 counts that never fall; between equal ones they are not counted.
+
+    Examples
+    --------
+    >>> rising(lambda k: int(k > 5), 9)
+    array([0, 0, 0, 0, 0, 0, 1, 1, 1])
+    """
+    counts = np.zeros(n, np.int64)
+    counts[0], counts[-1] = count_at(0), count_at(n - 1)
+    spans = [(0, n - 1)]
+    while spans:
+        low, high = spans.pop()
+        if counts[low] == counts[high]:
+            counts[low:high] = counts[low]
+        elif high - low > 1:
+            middle = (low + high) // 2
+            counts[middle] = count_at(middle)
+            spans += [(low, middle), (middle, high)]
+    return counts
+
+
 def gaps_of(file: PackingFile) -> FloatArray:
     """Return the (B,) gaps of a packing below the largest swelling, each at the middle of its step."""
     packing = file.packing()
     rattlers = Contacts.of(packing).rattlers
-    touching = np.empty(len(SWELLINGS), np.int64)
-    for k, h in enumerate(SWELLINGS):
-        swollen = packing.with_(diameters=(1 + h) * packing.diameters)
-        touching[k] = np.count_nonzero(~rattlers[find_contacts(swollen).pairs].any(axis=1))
+
+    def touching_at(k: int) -> int:
+        swollen = packing.with_(diameters=(1 + SWELLINGS[k]) * packing.diameters)
+        return np.count_nonzero(~rattlers[find_contacts(swollen).pairs].any(axis=1))
+
+    touching = rising(touching_at, len(SWELLINGS))
     middles = np.sqrt(SWELLINGS[1:] * SWELLINGS[:-1])
     return np.repeat(middles, np.diff(touching))
 

@@ -107,7 +107,7 @@ def power_of(
 
 
 def figure_from(found: list[Distribution], of: Quantity, title: str, below: float) -> Figure:
-    """Draw cumulative distributions on the left and powers on the right."""
+    """Draw cumulative distributions on the left and powers on the right, extrapolated ones filled."""
     figure = figure_of(10.5, 4.4, dpi=90)
     left, right = figure.subplots(1, 2)
     for k, one in enumerate(found):
@@ -116,7 +116,9 @@ def figure_from(found: list[Distribution], of: Quantity, title: str, below: floa
         fraction = np.arange(1, len(one.values) + 1) / len(one.values)
         line: dict[str, Any] = {"color": style["color"], "ls": ("-", "--")[k % 2], "lw": 1}
         left.plot(one.values, fraction, **line, label=label)
-        right.errorbar(max(one.Delta, 1e-3), one.power, one.error, **style)
+        where = max(one.Delta, 1e-3)
+        right.errorbar(where, one.power, one.error, **style)
+        right.errorbar(1.1 * where, *one.limit, **style | {"mfc": style["color"]})
     left.axvline(below, color="0.6", lw=0.8, ls=":")
     left.set(xscale="log", yscale="log", xlim=(1e-4, None))
     left.set_ylim(0.5 / max(len(one.values) for one in found), 1.3)
@@ -124,6 +126,7 @@ def figure_from(found: list[Distribution], of: Quantity, title: str, below: floa
     right.axhline(0, color="0.6", lw=0.8, ls=":")
     right.set(xscale="log", ylabel=rf"exponent ${of.symbol}$ of small {of.name}")
     right.set_xlabel(r"$\Delta$, aspect ratio $-\,1$ (discs at $10^{-3}$); $w_1=1/(1+\Delta)$")
+    right.set_title("open: below the bound; filled: extrapolated to 0", fontsize=8)
     figure.suptitle(title, fontsize=8)
     left.legend(fontsize=7)
     return figure
