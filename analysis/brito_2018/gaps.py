@@ -67,7 +67,7 @@ def gaps_of(file: PackingFile) -> FloatArray:
 
     def touching_at(k: int) -> int:
         swollen = packing.with_(diameters=(1 + SWELLINGS[k]) * packing.diameters)
-        return np.count_nonzero(~rattlers[find_contacts(swollen).pairs].any(axis=1))
+        return int(np.count_nonzero(~rattlers[find_contacts(swollen).pairs].any(axis=1)))
 
     touching = rising(touching_at, len(SWELLINGS))
     middles = np.sqrt(SWELLINGS[1:] * SWELLINGS[:-1])
