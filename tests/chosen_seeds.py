@@ -14,10 +14,8 @@ chosen_by_seed = pytest.mark.xfail(
 )
 
 # BLAS, with which some packings of tests are minimised, sums in another order without it.
-HAS_AVX512 = bool(np._core._multiarray_umath.__cpu_features__["AVX512F"])
-
 chosen_with_avx512 = pytest.mark.xfail(
-    not HAS_AVX512,
+    not np._core._multiarray_umath.__cpu_features__["AVX512F"],
     reason="the packing is another one without AVX-512, which may not be what the test is about",
     strict=False,
 )
