@@ -9,6 +9,7 @@
 #include "bindings/arrays.hpp"
 #include "bindings/contact_arrays.hpp"
 #include "bindings/shape.hpp"
+#include "landscape/elimination_order.hpp"
 #include "packing/team.hpp"
 
 #include <nanobind/stl/optional.h>
@@ -377,6 +378,24 @@ nb::object boundary_arcs(const Array2<double> &rows)
   return arcs.release();
 }
 
+nb::object order_of_elimination(const Array2<double> &position, const Array2<std::int64_t> &pairs)
+{
+  const std::size_t N = position.shape(0), D = position.shape(1);
+  require((D == 2 || D == 3) && pairs.shape(1) == 2,
+          "positions and pairs do not have the shapes (N, D) and (M, 2).");
+  require(are_finite(position.data(), position.size()), "a position is not finite.");
+  const std::vector<std::int64_t> of(pairs.data(), pairs.data() + pairs.size());
+  require(std::all_of(of.begin(), of.end(),
+                      [&](std::int64_t n) { return n >= 0 && static_cast<std::size_t>(n) < N; }),
+          "a pair has a particle that does not exist.");
+  const std::vector<double> at(position.data(), position.data() + position.size());
+  const std::vector<int> place =
+      D == 2 ? elimination_order<2>(at, of) : elimination_order<3>(at, of);
+  NewArray<std::int64_t> places({N});
+  for (std::size_t n = 0; n < N; ++n) places[n] = place[n];
+  return places.release();
+}
+
 }  // namespace
 
 void export_probes(nb::module_ &m)
@@ -424,6 +443,9 @@ void export_probes(nb::module_ &m)
       "boundary_arcs", &boundary_arcs, "discs"_a,
       "Arcs of the boundary of a union of discs (n, 4) in the plane (M, 3): index of the disc and\n"
       "the angles at both ends, counter-clockwise.");
+  m.def("elimination_order", &order_of_elimination, "position"_a, "pairs"_a,
+        "Places (N,) of particles in an order of elimination with little fill-in, from their\n"
+        "positions (N, D) and the pairs (M, 2) that share a block.");
 }
 
 }  // namespace jamshape

@@ -6,10 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <Eigen/Core>
-#include <Eigen/OrderingMethods>
-#include <Eigen/SparseCore>
 #include <memory>
-#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -24,6 +21,8 @@ class Factors {
  public:
   virtual ~Factors() = default;
   virtual std::size_t size() const = 0;
+  /// The number of solutions that take as long as new factors.
+  virtual double price() const = 0;
   /// Solution for a right-hand side (n,) in the coordinates.
   virtual Eigen::VectorXd solve(const Eigen::Ref<const Eigen::VectorXd> &right) const = 0;
 };
@@ -33,14 +32,14 @@ class Factors {
 enum class Fill { COMPLETE, NONE };
 
 /// Sparsity pattern of a symmetric matrix of blocks, one row per particle, and of its factor L: the
-/// graph of the particles' contacts and the fill-in. Made once for all matrices of a list of pairs.
+/// graph of the particles' contacts and the fill-in.
 struct BlockPattern {
-  /// Pattern for N particles, whose coordinates have these numbers (N, block), -1 for none, and the
-  /// pairs of them (M, 2) that share a block.
+  /// Pattern for N particles, whose coordinates have these numbers (N, block), -1 for none, the
+  /// pairs of them (M, 2) that share a block, and their places (N,) in the order of elimination.
   BlockPattern(std::vector<std::int64_t> numbers, const std::vector<std::int64_t> &pairs,
-               std::size_t N, Fill what_fill) :
+               std::vector<int> order, Fill what_fill) :
       n(numbers.size() - std::count(numbers.begin(), numbers.end(), -1)),
-      column(std::move(numbers)), fill(what_fill), place(ordered(N, pairs))
+      column(std::move(numbers)), fill(what_fill), place(std::move(order))
   {
     std::vector<std::vector<int>> below(size());
     for (std::size_t p = 0; p < pairs.size(); p += 2) {
@@ -70,6 +69,17 @@ struct BlockPattern {
 
   std::size_t size() const { return place.size(); }
 
+  /// Products of blocks in an elimination, over the blocks of the factor.
+  double products_per_block() const
+  {
+    double products = 0.0;
+    for (std::size_t j = 0; j < size(); ++j) {
+      const double below = first[j + 1] - first[j];
+      products += below * below;
+    }
+    return products / static_cast<double>(std::max<std::size_t>(row.size(), 1));
+  }
+
   /// The number of the matrix's block below a diagonal one in a row.
   int find(int below, int row_sought) const
   {
@@ -90,29 +100,6 @@ struct BlockPattern {
   std::vector<LeftBlock> left;  // ascending within a row
 
  private:
-  /// An order of elimination with little fill-in (approximate minimum degree), if there will be
-  /// any.
-  std::vector<int> ordered(std::size_t N, const std::vector<std::int64_t> &pairs) const
-  {
-    if (fill == Fill::NONE) {
-      std::vector<int> as_they_are(N);
-      std::iota(as_they_are.begin(), as_they_are.end(), 0);
-      return as_they_are;
-    }
-    std::vector<Eigen::Triplet<double>> entries;
-    for (std::size_t i = 0; i < N; ++i) entries.emplace_back(i, i, 1.0);
-    for (std::size_t p = 0; p < pairs.size(); p += 2) {
-      const auto [low, high] = std::minmax(pairs[p], pairs[p + 1]);
-      entries.emplace_back(low, high, 1.0);
-    }
-    Eigen::SparseMatrix<double> neighbours(N, N);
-    neighbours.setFromTriplets(entries.begin(), entries.end());
-    Eigen::AMDOrdering<int>::PermutationType inverse;
-    Eigen::AMDOrdering<int>()(neighbours.selfadjointView<Eigen::Upper>(), inverse);
-    const auto order = inverse.inverse().eval();
-    return {order.indices().data(), order.indices().data() + N};
-  }
-
   static void sort_once(std::vector<int> &rows)
   {
     std::sort(rows.begin(), rows.end());
@@ -194,8 +181,10 @@ template <int BLOCK> class BlockFactors : public Factors {
  public:
   BlockFactors(std::shared_ptr<const BlockPattern> of, const BlockKernels &compiled) :
       pattern(std::move(of)), kernels(compiled), diagonal(pattern->size()),
-      below(pattern->row.size()), inverse_pivots(BLOCK * pattern->size()),
-      block_of_row(pattern->size()), column_of_row(pattern->size())
+      below(pattern->row.size()),
+      solutions(BLOCK * pattern->products_per_block() / PRODUCTS_PER_SOLUTION),
+      inverse_pivots(BLOCK * pattern->size()), block_of_row(pattern->size()),
+      column_of_row(pattern->size())
   {
   }
 
@@ -212,6 +201,7 @@ template <int BLOCK> class BlockFactors : public Factors {
   }
 
   std::size_t size() const override { return pattern->n; }
+  double price() const override { return solutions; }
 
   Eigen::VectorXd solve(const Eigen::Ref<const Eigen::VectorXd> &right) const override
   {
@@ -221,10 +211,15 @@ template <int BLOCK> class BlockFactors : public Factors {
   }
 
  private:
+  /// Products of two blocks in the time that a solution takes for one of them, times BLOCK: a
+  /// solution waits for memory.
+  static constexpr double PRODUCTS_PER_SOLUTION = 15.0;
+
   std::shared_ptr<const BlockPattern> pattern;
   BlockKernels kernels;
   // L below the pivots, which its diagonal holds.
   mutable std::vector<BlockOf<BLOCK>> diagonal, below;
+  double solutions;
   mutable std::vector<double> inverse_pivots;
   mutable std::vector<int> block_of_row, column_of_row;  // work space
 

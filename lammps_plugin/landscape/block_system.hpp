@@ -2,6 +2,7 @@
 
 #include "landscape/block_factors.hpp"
 #include "landscape/conjugate_gradients.hpp"
+#include "landscape/elimination_order.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,6 +10,7 @@
 #include <cstdint>
 #include <Eigen/Core>
 #include <memory>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -37,7 +39,7 @@ class BlockSystem {
 
 /// Layout of a block system: N particles, whose at most `most` coordinates have the numbers column
 /// (N, most), -1 for none, and pairs of them (M, 2), of which only those are added that are `used`
-/// (M,).
+/// (M,). `position` (N, D) is where the particles are in their box, if fill-in is complete.
 struct BlockPlan {
   const std::vector<std::int64_t> &column;
   const std::vector<std::int64_t> &pairs;
@@ -45,6 +47,7 @@ struct BlockPlan {
   std::size_t N;
   int most;
   Fill fill;
+  std::vector<double> position;
 };
 
 /// A matrix whose equations are solved by conjugate gradients, preconditioned with incomplete
@@ -59,6 +62,7 @@ template <int BLOCK> class IteratedFactors : public Factors {
   }
 
   std::size_t size() const override { return pattern->n; }
+  double price() const override { return 1.0; }
 
   Eigen::VectorXd solve(const Eigen::Ref<const Eigen::VectorXd> &right) const override
   {
@@ -99,7 +103,8 @@ template <int BLOCK, int D> class BlockSystemOf : public BlockSystem {
     for (std::size_t k = 0; k < pairs.size(); ++k) {
       if (plan.used[k / 2]) coupled.push_back(pairs[k]);
     }
-    pattern = std::make_shared<BlockPattern>(std::move(column), coupled, plan.N, plan.fill);
+    pattern = std::make_shared<BlockPattern>(std::move(column), coupled, ordered(plan, coupled),
+                                             plan.fill);
     for (std::size_t p = 0; p < pairs.size() / 2; ++p) {
       const int i = place(p, 0), j = place(p, 1);
       block.push_back(plan.used[p] ? pattern->find(std::min(i, j), std::max(i, j)) : -1);
@@ -200,6 +205,16 @@ template <int BLOCK, int D> class BlockSystemOf : public BlockSystem {
   BlockMatrix<BLOCK> hessian;
   std::vector<std::shared_ptr<BlockFactors<BLOCK>>> made;
   BlockKernels kernels = block_kernels<BLOCK>();
+
+  /// Places of the particles in the order of elimination: with little fill-in, if there will be
+  /// any.
+  static std::vector<int> ordered(const BlockPlan &plan, const std::vector<std::int64_t> &coupled)
+  {
+    if (plan.fill == Fill::COMPLETE) return elimination_order<D>(plan.position, coupled);
+    std::vector<int> as_they_are(plan.N);
+    std::iota(as_they_are.begin(), as_they_are.end(), 0);
+    return as_they_are;
+  }
 
   /// Row of a pair's first or second particle.
   int place(std::size_t p, int side) const { return pattern->place[pairs[2 * p + side]]; }

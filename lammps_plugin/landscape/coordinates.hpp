@@ -70,6 +70,21 @@ template <int D> class BasePoses {
     }
   }
 
+  /// (N, D) where particles are within the box: distances along its edges, from 0 to their lengths.
+  std::vector<double> in_box() const
+  {
+    const std::vector<double> &cell = base.cell[0];
+    std::vector<double> found = base.position[0];
+    for (std::size_t first = 0; first < found.size(); first += D) {
+      for (int k = D; k-- > 0;) {
+        const double edge = cell[(D + 1) * k], part = found[first + k] / edge;
+        for (int m = 0; m < k; ++m) found[first + m] -= part * cell[D * m + k];
+        found[first + k] = (part - std::floor(part)) * edge;
+      }
+    }
+    return found;
+  }
+
   Vec<D> shift(const Displacement &at, std::size_t i) const
   {
     Vec<D> by;

@@ -127,18 +127,20 @@ class NewtonSystem {
   /// A step of which the line search takes a smaller part had a wrong direction.
   static constexpr double FAR_OFF = 0x1p-6;
 
-  /// Iterations with complete factors of an earlier base that take less time than new ones, and the
-  /// remainder of the solution over the accuracy of other iterations.
+  /// Most iterations with complete factors of an earlier base: as many as take this part of the
+  /// time of new ones, and at least this number. And the remainder of the solution over the
+  /// accuracy of other iterations.
+  static constexpr double PART_OF_PRICE = 0.4;
   static constexpr int MOST_ITERATIONS = 10;
   static constexpr double REMAINDER = 0.1;
 
   /// Smallest shift of incomplete factors, over the largest diagonal element, if pivots need one.
   static constexpr double INCOMPLETE = 1e-4;
 
-  /// Iterations with incomplete factors, over the number of coordinates, that take as long as
-  /// complete factors: 0.06 to 0.13 for 400 to 1000 spheres or spheroids. With more than MANY
-  /// coordinates the memory of complete factors grows too large.
-  static constexpr double FEW = 0.1;
+  /// Iterations with incomplete factors, over the number of coordinates, after which complete ones
+  /// are made: these take as long as twice as many. With more than MANY coordinates their memory
+  /// grows too large.
+  static constexpr double FEW = 0.04;
   static constexpr std::size_t MANY = 30000;
 
   LocalEnergyModel &about;
@@ -212,10 +214,11 @@ class NewtonSystem {
   Iterated with_old_factors(const Vector &right, double accuracy)
   {
     const double enough = REMAINDER * accuracy;
-    const Iterated found =
-        iterated(*complete, right, MOST_ITERATIONS,
-                 [&](const Vector &, double part) { return !(part > enough * enough); });
-    is_far = 2 * (found.n - 1) > MOST_ITERATIONS;
+    const int most = std::max(MOST_ITERATIONS, static_cast<int>(PART_OF_PRICE * complete->price()));
+    const Iterated found = iterated(*complete, right, most, [&](const Vector &, double part) {
+      return !(part > enough * enough);
+    });
+    is_far = 2 * (found.n - 1) > most;
     return found;
   }
 

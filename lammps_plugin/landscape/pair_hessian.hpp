@@ -33,14 +33,15 @@ template <class Model, int D> class PairHessian {
     std::fill_n(strained.c, D, 1.0);
   }
 
-  /// Differentiates at a point, with blocks for such fill-in. `used` returns which pairs (M,) these
-  /// are for; contacts start from `starts` (M,), if there are any, in the threads of `by`.
+  /// Differentiates at a point, with blocks for such fill-in, kept from an earlier point if they
+  /// are `lasting`. `used` returns which pairs (M,) these are for; contacts start from `starts`
+  /// (M,), if there are any, in the threads of `by`.
   template <class Used>
   void differentiate(const Moved &posed, const Displacement &at, Fill with, const Start *starts,
-                     Team *by, const Used &used)
+                     Team *by, bool lasting, const Used &used)
   {
     std::unique_ptr<BlockSystem> &own = systems[with == Fill::COMPLETE];
-    if (!own || with == Fill::NONE) own = block_system(used(), with);
+    if (!own || !lasting) own = block_system(used(), with);
     present = own.get();
     find_axes(at);
     if (add_pairs(posed, at.strain, starts, by)) return;
@@ -107,8 +108,14 @@ template <class Model, int D> class PairHessian {
   /// The block system of these pairs, with blocks of displacements alone if nothing can rotate.
   std::unique_ptr<BlockSystem> block_system(const std::vector<char> &used, Fill with) const
   {
-    const BlockPlan plan{near.coordinates.column, pairs.particles, used,
-                         near.n_particles(),      BLOCK,           with};
+    const bool is_complete = with == Fill::COMPLETE;
+    const BlockPlan plan{near.coordinates.column,
+                         pairs.particles,
+                         used,
+                         near.n_particles(),
+                         BLOCK,
+                         with,
+                         is_complete ? near.in_box() : std::vector<double>{}};
     if (near.any_turns()) return std::make_unique<BlockSystemOf<BLOCK, D>>(plan);
     return std::make_unique<BlockSystemOf<D, D>>(plan);
   }

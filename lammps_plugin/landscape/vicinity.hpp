@@ -162,7 +162,8 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   {
     const Moved &posed = moved_to(at);
     hessian.differentiate(posed, at, with, remembers ? starts.data() : nullptr,
-                          team_for(posed.size()), [&] { return coupled(posed, at, with); });
+                          team_for(posed.size()), is_lasting(with),
+                          [&] { return coupled(posed, at, with); });
   }
 
   const Eigen::VectorXd &coupling() const override { return hessian.coupling(); }
@@ -354,13 +355,16 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     hessian.forget();
   }
 
-  /// Flags of the pairs that have blocks. Pairs further apart than a small margin are left out,
-  /// since they would multiply the fill-in; a system without fill-in is made in no time, so that it
-  /// leaves out all pairs that do not touch.
+  /// Whether a system of blocks serves for several points. Without fill-in it is made in no time,
+  /// and fill-in in 3D takes far more time than a new system.
+  bool is_lasting(Fill with) const { return with == Fill::COMPLETE && fill() == Fill::COMPLETE; }
+
+  /// Flags of the pairs that have blocks: those that touch, for several points also those within a
+  /// small margin, since more would multiply the fill-in.
   std::vector<char> coupled(const Moved &posed, const Displacement &at, Fill with) const
   {
     std::vector<char> used(posed.size());
-    if (with == Fill::NONE) {
+    if (!is_lasting(with)) {
       for (std::size_t p = 0; p < used.size(); ++p) {
         used[p] = posed.may_touch(p, posed.separation(p));
       }

@@ -152,6 +152,10 @@ def probes(fuzz, dimension):
         "near_spheres", _contact.near_spheres, centre=np.ones((2, dimension)), radius=np.ones(2),
         cell=5.0 * np.eye(dimension),
     )  # fmt: skip
+    fuzz.call(
+        "elimination_order", _contact.elimination_order,
+        position=np.random.default_rng(2).random((20, dimension)), pairs=np.array([[0, 1], [1, 19]]),
+    )  # fmt: skip
     fuzz.call("counts_of_team", _contact.counts_of_team, threads=2, first_that_fails=1, rounds=2)
     flat = np.zeros((2, 2), bool)
     pairs, normals = np.array([[0, 1], [1, 2]]), np.ones((2, 3))
