@@ -34,7 +34,7 @@ inline std::vector<int> by_minimum_degree(std::size_t N, const std::vector<std::
 /// eliminated after both.
 template <int D> class Dissection {
  public:
-  /// Of particles at these positions (N, D), in a box that may be periodic.
+  /// Order of particles at these positions (N, D), in a box that may be periodic.
   Dissection(const std::vector<double> &positions, const std::vector<std::int64_t> &pairs) :
       position(positions), neighbours(positions.size() / D), region(neighbours.size()),
       partner(neighbours.size()), reached(neighbours.size()), place(neighbours.size())

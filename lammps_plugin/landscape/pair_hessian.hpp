@@ -33,15 +33,14 @@ template <class Model, int D> class PairHessian {
     std::fill_n(strained.c, D, 1.0);
   }
 
-  /// Differentiates at a point, with blocks for such fill-in, kept from an earlier point if they
-  /// are `lasting`. `used` returns which pairs (M,) these are for; contacts start from `starts`
-  /// (M,), if there are any, in the threads of `by`.
+  /// Differentiates at a point, with blocks for such fill-in. `used` returns which pairs (M,) these
+  /// are for; contacts start from `starts` (M,), if there are any, in the threads of `by`.
   template <class Used>
   void differentiate(const Moved &posed, const Displacement &at, Fill with, const Start *starts,
-                     Team *by, bool lasting, const Used &used)
+                     Team *by, const Used &used)
   {
     std::unique_ptr<BlockSystem> &own = systems[with == Fill::COMPLETE];
-    if (!own || !lasting) own = block_system(used(), with);
+    if (!own) own = block_system(used(), with);
     present = own.get();
     find_axes(at);
     if (add_pairs(posed, at.strain, starts, by)) return;
@@ -53,8 +52,13 @@ template <class Model, int D> class PairHessian {
   /// Forgets the blocks, which belong to the pairs.
   void forget()
   {
+    for (const Fill fill : {Fill::NONE, Fill::COMPLETE}) forget(fill);
+  }
+  /// Forgets those for such fill-in.
+  void forget(Fill fill)
+  {
     present = nullptr;
-    for (auto &one : systems) one = nullptr;
+    systems[fill == Fill::COMPLETE] = nullptr;
   }
 
   BlockSystem &blocks() { return *present; }

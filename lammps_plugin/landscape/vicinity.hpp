@@ -161,9 +161,9 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   void differentiate(const Displacement &at, Fill with) override
   {
     const Moved &posed = moved_to(at);
+    if (!is_lasting(with)) hessian.forget(with);
     hessian.differentiate(posed, at, with, remembers ? starts.data() : nullptr,
-                          team_for(posed.size()), is_lasting(with),
-                          [&] { return coupled(posed, at, with); });
+                          team_for(posed.size()), [&] { return coupled(posed, at, with); });
   }
 
   const Eigen::VectorXd &coupling() const override { return hessian.coupling(); }
