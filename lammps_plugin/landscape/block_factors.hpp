@@ -181,10 +181,8 @@ template <int BLOCK> class BlockFactors : public Factors {
  public:
   BlockFactors(std::shared_ptr<const BlockPattern> of, const BlockKernels &compiled) :
       pattern(std::move(of)), kernels(compiled), diagonal(pattern->size()),
-      below(pattern->row.size()),
-      solutions(BLOCK * pattern->products_per_block() / PRODUCTS_PER_SOLUTION),
-      inverse_pivots(BLOCK * pattern->size()), block_of_row(pattern->size()),
-      column_of_row(pattern->size())
+      below(pattern->row.size()), inverse_pivots(BLOCK * pattern->size()),
+      block_of_row(pattern->size()), column_of_row(pattern->size())
   {
   }
 
@@ -201,7 +199,10 @@ template <int BLOCK> class BlockFactors : public Factors {
   }
 
   std::size_t size() const override { return pattern->n; }
-  double price() const override { return solutions; }
+  double price() const override
+  {
+    return BLOCK * pattern->products_per_block() / PRODUCTS_PER_SOLUTION;
+  }
 
   Eigen::VectorXd solve(const Eigen::Ref<const Eigen::VectorXd> &right) const override
   {
@@ -219,7 +220,6 @@ template <int BLOCK> class BlockFactors : public Factors {
   BlockKernels kernels;
   // L below the pivots, which its diagonal holds.
   mutable std::vector<BlockOf<BLOCK>> diagonal, below;
-  double solutions;
   mutable std::vector<double> inverse_pivots;
   mutable std::vector<int> block_of_row, column_of_row;  // work space
 

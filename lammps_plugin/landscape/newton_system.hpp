@@ -138,8 +138,7 @@ class NewtonSystem {
   static constexpr double INCOMPLETE = 1e-4;
 
   /// Iterations with incomplete factors, over the number of coordinates, after which complete ones
-  /// are made: these take as long as twice as many. With more than MANY coordinates their memory
-  /// grows too large.
+  /// are made. With more than MANY coordinates their memory grows too large.
   static constexpr double FEW = 0.04;
   static constexpr std::size_t MANY = 30000;
 
