@@ -101,13 +101,17 @@ template <class Model, int D, class S = double> using ContactOf = Contact<D, S, 
 /// The contacts of as many pairs as a pack has lanes, without bonds: energies and their derivatives
 /// of those that touch. A lane marked `alone` is of a rare kind and left to the code for single
 /// pairs; `further` lanes, which may have a second bond, take longer and go into packs of their
-/// own.
-template <int D, class S> struct ContactLanes {
+/// own. Bodies that contacts cannot rotate have no torques.
+template <int D, class S> struct CentralLanes {
+  static constexpr bool HAS_TORQUES = false;
   S energy{0.0};
   Vec<D, S> force{};
-  Torque<D, S> torque_i{}, torque_j{};
   S bond_force{0.0};  // sum of the magnitudes
   Truth<S> touching, alone{}, further{}, two_bonds{};
+};
+template <int D, class S> struct ContactLanes : CentralLanes<D, S> {
+  static constexpr bool HAS_TORQUES = true;
+  Torque<D, S> torque_i{}, torque_j{};
 };
 
 /// Starting point of the search for a pair's next contact, remembered from the previous one: a

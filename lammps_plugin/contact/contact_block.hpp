@@ -15,6 +15,7 @@ template <int D> struct ContactBlock {
   alignas(64) double separation[D][MOST];
   alignas(64) double k_e[MOST];
   double margin = 0.0;  // added to the distances of first touch, where only `touching` is needed
+  bool turns = true;    // whether contacts can rotate any of the bodies: if not, torques may be unset
 
   /// One bit per pair: whether it touches, whether it is also `alone`, of a rare kind left to the
   /// code for single pairs, and whether it has two bonds. The members below are set for pairs that
@@ -47,7 +48,7 @@ template <int D> struct ContactBlock {
   }
 
   /// Finds the contacts in packs of this many lanes: `lanes_of(block, first)` returns the
-  /// ContactLanes of the pairs of a block from `first` on, and each of `further_of` those of the
+  /// lanes of the pairs of a block from `first` on, and each of `further_of` those of the
   /// pairs that the function before it left to it.
   template <class LanesOf, class... FurtherOf>
   void find(int lanes, const LanesOf &lanes_of, const FurtherOf &...further_of)
@@ -118,9 +119,11 @@ template <int D> struct ContactBlock {
     found.energy.store(energy + first);
     found.bond_force.store(bond_force + first);
     for (int a = 0; a < D; ++a) found.force[a].store(force[a] + first);
-    for (int a = 0; a < ROTATIONS<D>; ++a) {
-      found.torque_i[a].store(torque_i[a] + first);
-      found.torque_j[a].store(torque_j[a] + first);
+    if constexpr (Lanes::HAS_TORQUES) {
+      for (int a = 0; a < ROTATIONS<D>; ++a) {
+        found.torque_i[a].store(torque_i[a] + first);
+        found.torque_j[a].store(torque_j[a] + first);
+      }
     }
   }
 

@@ -116,6 +116,7 @@ template <class ModelOf, int DIMENSION, class Scalar> class BodyPairs {
     around.reserve(shapes.size());
     for (const typename Model::Shape &shape : shapes) {
       around.push_back(WIDER * Model::template outer_radius<D>(shape));
+      has_turning = has_turning || Model::template turns<D>(shape);
       body.push_back(Model::template body<D, S>(shape));
     }
   }
@@ -152,7 +153,8 @@ template <class ModelOf, int DIMENSION, class Scalar> class BodyPairs {
   /// All bodies, at the origin.
   const Body *bodies() const { return body.data(); }
 
-  /// Whether contacts can rotate a particle, or either of a pair.
+  /// Whether contacts can rotate any particle, this one, or either of a pair.
+  bool any_turns() const { return has_turning; }
   bool turns(std::size_t n) const { return Model::template turns<D>(shapes[n]); }
   bool pair_turns(std::size_t p) const { return turns(first(p)) || turns(second(p)); }
 
@@ -166,6 +168,7 @@ template <class ModelOf, int DIMENSION, class Scalar> class BodyPairs {
   const Laws<typename Model::Law> *mixed;  // null if one law is that of all pairs
   std::vector<Body> body;                  // at the origin
   std::vector<double> around;              // radii of the bounding spheres
+  bool has_turning = false;
 };
 
 /// Pairs of posed particles. Separations have no rounding errors except that of S itself.
@@ -435,7 +438,11 @@ template <class Pairs> class NumberedBlock {
   static constexpr bool HAS_START = !std::is_same_v<Start, NoStart>;
 
   /// Contacts start from the previous ones, and store where they end, if `starts` is given.
-  NumberedBlock(const Pairs &posed, Start *of_pairs) : pairs(posed), starts(of_pairs) {}
+  NumberedBlock(const Pairs &posed, Start *of_pairs) :
+      pairs(posed), starts(posed.any_turns() ? of_pairs : nullptr)
+  {
+    block.turns = posed.any_turns();
+  }
 
   bool is_empty() const { return block.n == 0; }
 
@@ -512,9 +519,7 @@ template <class Pairs>
 void sum_part(PairSums<Pairs::D, typename Pairs::S> &sums, const Pairs &pairs,
               typename Pairs::Start *starts, const Range &part)
 {
-  bool any_turns = false;
-  for (std::size_t n = 0; n < pairs.n_particles() && !any_turns; ++n) any_turns = pairs.turns(n);
-  sums.clear(pairs.n_particles(), any_turns);
+  sums.clear(pairs.n_particles(), pairs.any_turns());
   if constexpr (std::is_same_v<typename Pairs::S, double> &&
                 PacksOf<typename Pairs::Model, Pairs::D>::EXIST) {
     if (auto *const find = packs_for(pairs)) {

@@ -242,6 +242,7 @@ template <class Model> class PairContactOf : public PairContact {
   template <int D, bool TURNS, bool TALLY> void evaluate_blocks(FindContacts<Model, D> &find)
   {
     ContactBlock<D> block;
+    block.turns = TURNS;
     typename BodiesOf<Model, D>::Block bodies(all<D>().now);
     for (int begin = 0; begin < n_close(); begin += block.MOST) {
       fill<D>(block, bodies, begin, std::min(begin + block.MOST, n_close()));

@@ -86,6 +86,16 @@ def test_packs_of_ellipsoids_give_what_pairs_give_alone(instructions, dimension,
 
 @each_set
 @pytest.mark.parametrize("dimension", [2, 3])
+def test_packs_where_all_are_round_give_what_pairs_give_alone(instructions, dimension, monkeypatch):
+    """To the last bit, without torques; some pairs have the same centre."""
+    packing = superellipsoids(np.random.default_rng([6, dimension]), dimension)
+    packing = replace(packing, diameters=np.repeat(packing.diameters[:, :1], 3, axis=1))
+    compare(monkeypatch, instructions, packing, 1)
+    assert sums(monkeypatch, instructions, packing, 1)["crossing"] >= 0
+
+
+@each_set
+@pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("p", [0.7, 0.9, 1.2, 1.5, 2.0, 2.3, 3.0])
 def test_packs_of_superellipsoids_give_what_pairs_give_alone(
     instructions, p, dimension, monkeypatch

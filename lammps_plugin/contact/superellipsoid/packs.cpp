@@ -136,6 +136,29 @@ void add_load(ContactLanes<D, Pack> &lanes, const TangencyLoad<D, Pack> &load, b
   lanes.bond_force = norm(load.force);
 }
 
+/// Contacts of discs or spheres.
+template <int D>
+CentralLanes<D, Pack> round_contacts_of(const SuperellipsoidBody<D> *bodies, double power,
+                                        const ContactBlock<D> &block, int first)
+{
+  const auto radius_of = [](const auto &body) { return body.semi_axes[0]; };
+  const Pack R_i = each<D>(bodies, block.i + first, radius_of);
+  const Pack R_j = each<D>(bodies, block.j + first, radius_of);
+  Vec<D, Pack> r;
+  for (int a = 0; a < D; ++a) r[a] = Pack::load(block.separation[a] + first);
+  const Pack reach = R_i + R_j, distance_sq = norm_sq(r);
+  const Mask near = distance_sq < reach * reach;
+  const Tangency<D, Pack> at = tangency_of_spheres(r, R_i, R_j);
+  const TangencyLoad<D, Pack> load{at, r, {Pack::load(block.k_e + first), power}};
+  CentralLanes<D, Pack> lanes;
+  lanes.energy = load.energy;
+  lanes.force = load.force;
+  lanes.bond_force = norm(load.force);
+  lanes.alone = near & (distance_sq <= COINCIDENT * reach * COINCIDENT * reach);
+  lanes.touching = (near & (at.scale < Pack(1.0))) | lanes.alone;
+  return lanes;
+}
+
 template <int D>
 ContactLanes<D, Pack> contacts_of(const SuperellipsoidBody<D> *bodies, double power,
                                   ContactBlock<D> &block, int first)
@@ -179,6 +202,12 @@ template <InstructionSet SET, int D>
                                                    const SuperellipsoidLaw &law,
                                                    ContactBlock<D> &block)
 {
+  if (!block.turns) {
+    block.find(LANES, [&](const ContactBlock<D> &of, int first) {
+      return round_contacts_of<D>(bodies, law.bond.power, of, first);
+    });
+    return;
+  }
   block.find(LANES, [&](ContactBlock<D> &of, int first) {
     return contacts_of<D>(bodies, law.bond.power, of, first);
   });
