@@ -12,7 +12,6 @@
 #include "packing/split.hpp"
 #include "packing/team.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -117,6 +116,9 @@ template <class ModelOf, int DIMENSION, class Scalar> class BodyPairs {
     for (const typename Model::Shape &shape : shapes) {
       around.push_back(WIDER * Model::template outer_radius<D>(shape));
       has_turning = has_turning || Model::template turns<D>(shape);
+      if constexpr (PacksOf<Model, D>::EXIST) {
+        fits_packs = fits_packs && PacksOf<Model, D>::take(shape, shapes.front());
+      }
       body.push_back(Model::template body<D, S>(shape));
     }
   }
@@ -143,12 +145,7 @@ template <class ModelOf, int DIMENSION, class Scalar> class BodyPairs {
   const Body &second_body(std::size_t p) const { return body[second(p)]; }
 
   /// Whether packs support all of these particles.
-  bool packs_take_all() const
-  {
-    return std::all_of(shapes.begin(), shapes.end(), [&](const typename Model::Shape &shape) {
-      return PacksOf<Model, D>::take(shape, shapes.front());
-    });
-  }
+  bool packs_take_all() const { return fits_packs; }
 
   /// All bodies, at the origin.
   const Body *bodies() const { return body.data(); }
@@ -168,7 +165,7 @@ template <class ModelOf, int DIMENSION, class Scalar> class BodyPairs {
   const Laws<typename Model::Law> *mixed;  // null if one law is that of all pairs
   std::vector<Body> body;                  // at the origin
   std::vector<double> around;              // radii of the bounding spheres
-  bool has_turning = false;
+  bool has_turning = false, fits_packs = PacksOf<Model, D>::EXIST;
 };
 
 /// Pairs of posed particles. Separations have no rounding errors except that of S itself.
