@@ -15,7 +15,7 @@ template <int D> struct ContactBlock {
   alignas(64) double separation[D][MOST];
   alignas(64) double k_e[MOST];
   double margin = 0.0;  // added to the distances of first touch, where only `touching` is needed
-  bool turns = true;    // whether contacts can rotate any of the bodies: if not, torques may be unset
+  bool turns = true;  // whether contacts can rotate any of the bodies: if not, torques may be unset
 
   /// One bit per pair: whether it touches, whether it is also `alone`, of a rare kind left to the
   /// code for single pairs, and whether it has two bonds. The members below are set for pairs that
