@@ -17,7 +17,7 @@ Pack each(const SuperellipsoidBody<D> *bodies, const int *index, const NumberOf 
   return Pack::from([&](int k) { return number_of(bodies[index[k]]); });
 }
 
-/// Sizes only, all that round bodies need.
+/// Sizes only: all that tells whether bodies may touch.
 template <int D> BodyLanes<D> sizes_of(const SuperellipsoidBody<D> *bodies, const int *index)
 {
   BodyLanes<D> lanes;
@@ -42,17 +42,24 @@ void add_axes(BodyLanes<D> &lanes, const SuperellipsoidBody<D> *bodies, const in
   }
 }
 
-template <int D> bool are_round(const BodyLanes<D> &bodies)
-{
-  Mask round = bodies.semi_axes[1] == bodies.semi_axes[0];
-  for (int a = 2; a < D; ++a) round = round & (bodies.semi_axes[a] == bodies.semi_axes[0]);
-  return bodies.is_ellipsoid() && all(round);
-}
+/// Separations of pairs, with the lanes whose bounding spheres touch, and whose centres coincide.
+template <int D> struct SeparationLanes {
+  Vec<D, Pack> r;
+  Mask near, coincident;
+
+  SeparationLanes(const ContactBlock<D> &block, int first, const Pack &reach)
+  {
+    for (int a = 0; a < D; ++a) r[a] = Pack::load(block.separation[a] + first);
+    const Pack distance_sq = norm_sq(r);
+    near = distance_sq < reach * reach;
+    coincident = near & (distance_sq <= COINCIDENT * reach * COINCIDENT * reach);
+  }
+};
 
 template <int D> struct PairLanes {
   BodyLanes<D> i, j;
   Vec<D, Pack> r;
-  Mask near;  // lanes whose bounding spheres touch
+  Mask near;
 };
 
 /// Whether and where the pairs touch that no plane was found to separate.
@@ -124,15 +131,10 @@ template <int D> FoundLanes<D> found_from(const PairLanes<D> &pairs, const Vec<D
   return found_by<detail::ByPoint<D, Pack>>(pairs, n);
 }
 
-template <int D>
-void add_load(ContactLanes<D, Pack> &lanes, const TangencyLoad<D, Pack> &load, bool turns)
+template <int D> void add_load(CentralLanes<D, Pack> &lanes, const TangencyLoad<D, Pack> &load)
 {
   lanes.energy = load.energy;
   lanes.force = load.force;
-  if (turns) {
-    lanes.torque_i = load.torque_i;
-    lanes.torque_j = load.torque_j;
-  }
   lanes.bond_force = norm(load.force);
 }
 
@@ -144,18 +146,12 @@ CentralLanes<D, Pack> round_contacts_of(const SuperellipsoidBody<D> *bodies, dou
   const auto radius_of = [](const auto &body) { return body.semi_axes[0]; };
   const Pack R_i = each<D>(bodies, block.i + first, radius_of);
   const Pack R_j = each<D>(bodies, block.j + first, radius_of);
-  Vec<D, Pack> r;
-  for (int a = 0; a < D; ++a) r[a] = Pack::load(block.separation[a] + first);
-  const Pack reach = R_i + R_j, distance_sq = norm_sq(r);
-  const Mask near = distance_sq < reach * reach;
-  const Tangency<D, Pack> at = tangency_of_spheres(r, R_i, R_j);
-  const TangencyLoad<D, Pack> load{at, r, {Pack::load(block.k_e + first), power}};
+  const SeparationLanes<D> apart(block, first, R_i + R_j);
+  const Tangency<D, Pack> at = tangency_of_spheres(apart.r, R_i, R_j);
   CentralLanes<D, Pack> lanes;
-  lanes.energy = load.energy;
-  lanes.force = load.force;
-  lanes.bond_force = norm(load.force);
-  lanes.alone = near & (distance_sq <= COINCIDENT * reach * COINCIDENT * reach);
-  lanes.touching = (near & (at.scale < Pack(1.0))) | lanes.alone;
+  lanes.alone = apart.coincident;
+  lanes.touching = (apart.near & (at.scale < Pack(1.0))) | lanes.alone;
+  add_load(lanes, {at, apart.r, {Pack::load(block.k_e + first), power}});
   return lanes;
 }
 
@@ -165,31 +161,26 @@ ContactLanes<D, Pack> contacts_of(const SuperellipsoidBody<D> *bodies, double po
 {
   const int *const i = block.i + first, *const j = block.j + first;
   PairLanes<D> pairs{sizes_of(bodies, i), sizes_of(bodies, j), {}, {}};
-  for (int a = 0; a < D; ++a) pairs.r[a] = Pack::load(block.separation[a] + first);
-  const Pack reach = pairs.i.bounding_radius + pairs.j.bounding_radius;
-  const Pack distance_sq = norm_sq(pairs.r);
-  pairs.near = distance_sq < reach * reach;
+  const SeparationLanes<D> apart(block, first, pairs.i.bounding_radius + pairs.j.bounding_radius);
+  pairs.r = apart.r;
+  pairs.near = apart.near;
   ContactLanes<D, Pack> lanes;
   lanes.touching = lanes.alone;
   if (!any(pairs.near)) return lanes;
-  lanes.alone = pairs.near & (distance_sq <= COINCIDENT * reach * COINCIDENT * reach);
-  FoundLanes<D> of{{}, pairs.near, pairs.near};
-  const bool round = are_round(pairs.i) && are_round(pairs.j);
-  if (round) {
-    of.at = tangency_of_spheres(pairs.r, pairs.i.semi_axes[0], pairs.j.semi_axes[0]);
-  } else {
-    add_axes(pairs.i, bodies, i);
-    add_axes(pairs.j, bodies, j);
-    of = found_from(pairs, begin(pairs, block, first));
-    end(of.at.normal, pairs.near, block, first);
-    const Pack gap = gap_of(detail::TangencyProblem<D, Pack>::of(pairs.i, pairs.j, pairs.r), of.at);
-    const Mask bounded =
-        (gap <= Pack(TangencySearch<D, double>::GAP)) & is_far_below(gap, of.at.scale);
-    lanes.alone = lanes.alone | (of.sought & !(of.found & bounded));
-  }
+  add_axes(pairs.i, bodies, i);
+  add_axes(pairs.j, bodies, j);
+  const FoundLanes<D> of = found_from(pairs, begin(pairs, block, first));
+  end(of.at.normal, pairs.near, block, first);
+  const Pack gap = gap_of(detail::TangencyProblem<D, Pack>::of(pairs.i, pairs.j, pairs.r), of.at);
+  const Mask bounded =
+      (gap <= Pack(TangencySearch<D, double>::GAP)) & is_far_below(gap, of.at.scale);
+  lanes.alone = apart.coincident | (of.sought & !(of.found & bounded));
   lanes.touching = (of.found & (of.at.scale < Pack(1.0))) | lanes.alone;
   if (!any(lanes.touching)) return lanes;
-  add_load(lanes, {of.at, pairs.r, {Pack::load(block.k_e + first), power}}, !round);
+  const TangencyLoad<D, Pack> load{of.at, pairs.r, {Pack::load(block.k_e + first), power}};
+  add_load(lanes, load);
+  lanes.torque_i = load.torque_i;
+  lanes.torque_j = load.torque_j;
   return lanes;
 }
 
