@@ -28,45 +28,6 @@ Poses poses_from(const PoseArrays &arrays)
   return poses;
 }
 
-/// Description of the coordinates, as Python passes it.
-struct CoordinateArrays {
-  const Array2<std::int64_t> &column;     // (N, D + rotations)
-  const Array1<double> &rotation_length;  // (N,)
-  const Array1<double> &turning_radius;   // (N,)
-
-  Coordinates read(std::size_t N, int D) const
-  {
-    require(column.shape(0) == N && column.shape(1) == (D == 2 ? 3 : 6) &&
-                rotation_length.shape(0) == N && turning_radius.shape(0) == N,
-            "column, rotation_length and turning_radius do not have shapes (N, 3), in space (N, 6),"
-            " (N,) and (N,).");
-    require_finite(rotation_length, "rotation_length");
-    require_finite(turning_radius, "turning_radius");
-    const std::int64_t *const first = column.data(), *const last = first + column.size();
-    std::vector<double> per_length;
-    for (std::size_t i = 0; i < N; ++i) {
-      const double length = rotation_length.data()[i];
-      per_length.push_back(length > 0.0 ? 1.0 / length : 0.0);
-    }
-    const double *const radius = turning_radius.data();
-    return {number_of_columns(first, last), {first, last}, per_length, {radius, radius + N}};
-  }
-
- private:
-  /// Throws unless each coordinate in 0 ... n - 1 is a column of one particle.
-  static std::size_t number_of_columns(const std::int64_t *first, const std::int64_t *last)
-  {
-    std::vector<std::int64_t> numbers;
-    std::copy_if(first, last, std::back_inserter(numbers), [](std::int64_t c) { return c != -1; });
-    std::sort(numbers.begin(), numbers.end());
-    for (std::size_t n = 0; n < numbers.size(); ++n) {
-      require(numbers[n] == static_cast<std::int64_t>(n),
-              "column does not number the coordinates, expected each of 0, 1, ... once, or -1.");
-    }
-    return numbers.size();
-  }
-};
-
 Displacement checked(const LocalEnergyModel &of, const Array1<double> &x, double strain)
 {
   require(x.shape(0) == of.n(), "x has " + std::to_string(x.shape(0)) +
@@ -163,9 +124,9 @@ nb::object solve(const Factors &factors, const Array2<double> &right)
 /// Kept as a separate function: compilers limit inlining by the size of a function.
 template <class Model, int D>
 [[gnu::noinline]] std::unique_ptr<LocalEnergyModel> local_model_of(const ShapeOf<Model> &of,
-                                                                   Coordinates names, double skin)
+                                                                   double skin)
 {
-  return std::make_unique<VicinityOf<Model, D>>(of.shapes(), std::move(names), of.laws(), skin);
+  return std::make_unique<VicinityOf<Model, D>>(of.shapes(), of.laws(), skin);
 }
 
 /// Gives each shape's class a method that makes the energy of its particles.
@@ -176,19 +137,16 @@ void export_constructors()
     using Model = decltype(model);
     class_of<Model>().def(
         "local_energy_model",
-        [](const ShapeOf<Model> &of, const Array2<std::int64_t> &column,
-           const Array1<double> &rotation_length, const Array1<double> &turning_radius,
-           double skin) {
+        [](const ShapeOf<Model> &of, double skin) {
           require(skin > 0.0 && std::isfinite(skin),
                   "skin is " + shown(skin) + ", expected a positive length.");
-          const CoordinateArrays names{column, rotation_length, turning_radius};
-          return of.in_space(
-              [&](auto D) { return local_model_of<Model, D>(of, names.read(of.n(), D), skin); });
+          return of.in_space([&](auto D) { return local_model_of<Model, D>(of, skin); });
         },
-        "column"_a, "rotation_length"_a, "turning_radius"_a, "skin"_a,
-        "The energy about a base; column (N, 3), in space (N, 6), numbers of the coordinates\n"
-        "displacement, rotation, or -1; pairs of surfaces closer than a skin are listed. First of\n"
-        "all, move_to a base.");
+        "skin"_a,
+        "The energy about a base, by the displacement of each particle and, if contacts can "
+        "rotate\n"
+        "it, its rotation over 1 / rotation_length; pairs of surfaces closer than a skin are\n"
+        "listed. First of all, move_to a base.");
   });
 }
 

@@ -34,12 +34,11 @@ enum class Fill { COMPLETE, NONE };
 /// Sparsity pattern of a symmetric matrix of blocks, one row per particle, and of its factor L: the
 /// graph of the particles' contacts and the fill-in.
 struct BlockPattern {
-  /// Pattern for N particles, whose coordinates have these numbers (N, block), -1 for none, the
-  /// pairs of them (M, 2) that share a block, and their places (N,) in the order of elimination.
-  BlockPattern(std::vector<std::int64_t> numbers, const std::vector<std::int64_t> &pairs,
+  /// Pattern for N particles, the numbers (N + 1,) of their first coordinates, the pairs of them
+  /// (M, 2) that share a block, and their places (N,) in the order of elimination.
+  BlockPattern(std::vector<std::int64_t> first_coordinates, const std::vector<std::int64_t> &pairs,
                std::vector<int> order, Fill what_fill) :
-      n(numbers.size() - std::count(numbers.begin(), numbers.end(), -1)),
-      column(std::move(numbers)), fill(what_fill), place(std::move(order))
+      coordinate(std::move(first_coordinates)), fill(what_fill), place(std::move(order))
   {
     std::vector<std::vector<int>> below(size());
     for (std::size_t p = 0; p < pairs.size(); p += 2) {
@@ -68,6 +67,10 @@ struct BlockPattern {
   }
 
   std::size_t size() const { return place.size(); }
+  /// The number of coordinates.
+  std::size_t n() const { return coordinate.back(); }
+  /// The number of those of a particle.
+  int count(std::size_t i) const { return static_cast<int>(coordinate[i + 1] - coordinate[i]); }
 
   /// Products of blocks in an elimination, over the blocks of the factor.
   double products_per_block() const
@@ -88,8 +91,7 @@ struct BlockPattern {
     return static_cast<int>(std::lower_bound(begin, end, row_sought) - own_row.begin());
   }
 
-  std::size_t n;                     // coordinates
-  std::vector<std::int64_t> column;  // (N, block)
+  std::vector<std::int64_t> coordinate;  // (N + 1,) first of each particle
   Fill fill;
   std::vector<int> place;       // (N,) place of each particle in the order of elimination
   std::vector<int> own_first;   // (N + 1,) first block of the matrix below the diagonal, by columns
@@ -153,7 +155,7 @@ template <int BLOCK> class BlockRows {
 
   Eigen::VectorXd gathered()
   {
-    Eigen::VectorXd found(static_cast<Eigen::Index>(pattern.n));
+    Eigen::VectorXd found(static_cast<Eigen::Index>(pattern.n()));
     each([&](std::int64_t c, const double &component) { found[c] = component; });
     return found;
   }
@@ -166,9 +168,15 @@ template <int BLOCK> class BlockRows {
 
   template <class Then> void each(const Then &then)
   {
-    for (std::size_t k = 0; k < pattern.column.size(); ++k) {
-      const std::int64_t c = pattern.column[k];
-      if (c >= 0) then(c, x[STRIDE * pattern.place[k / BLOCK] + k % BLOCK]);
+    for (std::size_t i = 0; i < pattern.size(); ++i) {
+      const std::int64_t first = pattern.coordinate[i];
+      double *const row = &x[STRIDE * pattern.place[i]];
+      const int n = pattern.count(i);
+      if (n == BLOCK) {  // unrolled
+        for (int k = 0; k < BLOCK; ++k) then(first + k, row[k]);
+      } else {
+        for (int k = 0; k < n; ++k) then(first + k, row[k]);
+      }
     }
   }
 };
@@ -198,7 +206,7 @@ template <int BLOCK> class BlockFactors : public Factors {
     return kernels.factorise(matrix.view(*pattern), view());
   }
 
-  std::size_t size() const override { return pattern->n; }
+  std::size_t size() const override { return pattern->n(); }
   double price() const override
   {
     return BLOCK * pattern->products_per_block() / PRODUCTS_PER_SOLUTION;

@@ -37,14 +37,13 @@ class BlockSystem {
   virtual std::shared_ptr<Factors> iterated(const Eigen::VectorXd &added) = 0;
 };
 
-/// Layout of a block system: N particles, whose at most `most` coordinates have the numbers column
-/// (N, most), -1 for none, and pairs of them (M, 2), of which only those are added that are `used`
-/// (M,). `position` (N, D) is where the particles are in their box, if fill-in is complete.
+/// Layout of a block system: the numbers (N + 1,) of the first coordinates of particles with at
+/// most `most` each, and pairs of them (M, 2), of which only those are added that are `used` (M,).
+/// `position` (N, D) is where the particles are in their box, if fill-in is complete.
 struct BlockPlan {
-  const std::vector<std::int64_t> &column;
+  const std::vector<std::int64_t> &coordinate;
   const std::vector<std::int64_t> &pairs;
   const std::vector<char> &used;
-  std::size_t N;
   int most;
   Fill fill;
   std::vector<double> position;
@@ -61,7 +60,7 @@ template <int BLOCK> class IteratedFactors : public Factors {
   {
   }
 
-  std::size_t size() const override { return pattern->n; }
+  std::size_t size() const override { return pattern->n(); }
   double price() const override { return 1.0; }
 
   Eigen::VectorXd solve(const Eigen::Ref<const Eigen::VectorXd> &right) const override
@@ -94,17 +93,12 @@ template <int BLOCK, int D> class BlockSystemOf : public BlockSystem {
  public:
   explicit BlockSystemOf(const BlockPlan &plan) : most(plan.most), pairs(plan.pairs)
   {
-    std::vector<std::int64_t> column;
-    for (std::size_t i = 0; i < plan.N; ++i) {
-      const auto first = plan.column.begin() + i * most;
-      column.insert(column.end(), first, first + BLOCK);
-    }
     std::vector<std::int64_t> coupled;
     for (std::size_t k = 0; k < pairs.size(); ++k) {
       if (plan.used[k / 2]) coupled.push_back(pairs[k]);
     }
-    pattern = std::make_shared<BlockPattern>(std::move(column), coupled, ordered(plan, coupled),
-                                             plan.fill);
+    pattern =
+        std::make_shared<BlockPattern>(plan.coordinate, coupled, ordered(plan, coupled), plan.fill);
     for (std::size_t p = 0; p < pairs.size() / 2; ++p) {
       const int i = place(p, 0), j = place(p, 1);
       block.push_back(plan.used[p] ? pattern->find(std::min(i, j), std::max(i, j)) : -1);
@@ -116,9 +110,10 @@ template <int BLOCK, int D> class BlockSystemOf : public BlockSystem {
   {
     hessian.diagonal.assign(pattern->size(), Block::Zero());
     hessian.below.assign(pattern->own_row.size(), Block::Zero());
-    each([&](std::int64_t c, double &value) {
-      if (c < 0) value = 1.0;
-    });
+    for (std::size_t i = 0; i < pattern->size(); ++i) {
+      Block &own = hessian.diagonal[pattern->place[i]];
+      for (int k = pattern->count(i); k < BLOCK; ++k) own(k, k) = 1.0;
+    }
   }
 
   bool couples(std::size_t p) const override { return block[p] >= 0; }
@@ -151,10 +146,11 @@ template <int BLOCK, int D> class BlockSystemOf : public BlockSystem {
 
   Eigen::VectorXd diagonal() const override
   {
-    Eigen::VectorXd found(static_cast<Eigen::Index>(pattern->n));
-    each([&](std::int64_t c, const double &value) {
-      if (c >= 0) found[c] = value;
-    });
+    Eigen::VectorXd found(static_cast<Eigen::Index>(pattern->n()));
+    for (std::size_t i = 0; i < pattern->size(); ++i) {
+      const Block &own = hessian.diagonal[pattern->place[i]];
+      for (int k = 0; k < pattern->count(i); ++k) found[pattern->coordinate[i] + k] = own(k, k);
+    }
     return found;
   }
 
@@ -185,7 +181,7 @@ template <int BLOCK, int D> class BlockSystemOf : public BlockSystem {
     for (double shift = 0.0; std::isfinite(shift);
          shift = std::max(10.0 * shift, INCOMPLETE * largest)) {
       const Eigen::VectorXd shifts =
-          Eigen::VectorXd::Constant(static_cast<Eigen::Index>(pattern->n), shift);
+          Eigen::VectorXd::Constant(static_cast<Eigen::Index>(pattern->n()), shift);
       if (near->factorise(matrix, BlockRows<BLOCK>(*pattern, shifts))) {
         return std::make_shared<IteratedFactors<BLOCK>>(pattern, kernels, std::move(matrix), near);
       }
@@ -211,25 +207,13 @@ template <int BLOCK, int D> class BlockSystemOf : public BlockSystem {
   static std::vector<int> ordered(const BlockPlan &plan, const std::vector<std::int64_t> &coupled)
   {
     if (plan.fill == Fill::COMPLETE) return elimination_order<D>(plan.position, coupled);
-    std::vector<int> as_they_are(plan.N);
+    std::vector<int> as_they_are(plan.coordinate.size() - 1);
     std::iota(as_they_are.begin(), as_they_are.end(), 0);
     return as_they_are;
   }
 
   /// Row of a pair's first or second particle.
   int place(std::size_t p, int side) const { return pattern->place[pairs[2 * p + side]]; }
-
-  /// Calls `then` for each coordinate with its element on the diagonal.
-  template <class Matrix, class Then>
-  static void each_of(const BlockPattern &at, Matrix &matrix, const Then &then)
-  {
-    for (std::size_t k = 0; k < at.column.size(); ++k) {
-      const auto own = static_cast<Eigen::Index>(k % BLOCK);
-      then(at.column[k], matrix.diagonal[at.place[k / BLOCK]](own, own));
-    }
-  }
-  template <class Then> void each(const Then &then) { each_of(*pattern, hessian, then); }
-  template <class Then> void each(const Then &then) const { each_of(*pattern, hessian, then); }
 
   /// Factors in use nowhere else.
   std::shared_ptr<BlockFactors<BLOCK>> spare()

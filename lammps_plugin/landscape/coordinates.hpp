@@ -14,12 +14,24 @@
 
 namespace jamshape {
 
-/// Layout of the coordinates: column (N, D + rotations), -1 for none; rotations are measured as
-/// lengths, and move a surface by at most the turning radius per radian.
+/// The coordinates, particle by particle: its displacement, and its rotation if contacts can rotate
+/// it, measured as a length; a surface moves by at most the turning radius per radian.
 struct Coordinates {
-  std::size_t n;
-  std::vector<std::int64_t> column;
-  std::vector<double> radians_per_length, turning_radius;
+  std::vector<std::int64_t> first{0};                      // (N + 1,) number of each one's first
+  std::vector<double> radians_per_length, turning_radius;  // (N,) 0 without rotation
+
+  /// Adds the coordinates of a particle in D dimensions whose rotation has this length, or 0.
+  template <int D> void add(double rotation_length, double radius)
+  {
+    const bool turns = rotation_length > 0.0;
+    first.push_back(first.back() + D + (turns ? ROTATIONS<D> : 0));
+    radians_per_length.push_back(turns ? 1.0 / rotation_length : 0.0);
+    turning_radius.push_back(radius);
+  }
+
+  std::size_t n() const { return first.back(); }
+  /// The number of coordinates of a particle.
+  int count(std::size_t i) const { return static_cast<int>(first[i + 1] - first[i]); }
 };
 
 /// A point near the base: a displacement, then an affine strain of box and positions.
@@ -43,30 +55,18 @@ template <int D> class BasePoses {
   /// Whether rotations in 3D are about the axes of each body at the base instead of those of space.
   bool along_bodies = false;
 
-  /// `which_turn` (N,) tells which particles contacts can rotate.
-  BasePoses(Coordinates names, std::vector<char> which_turn) :
-      coordinates(std::move(names)), turning(std::move(which_turn))
-  {
-  }
+  explicit BasePoses(Coordinates of_particles) : coordinates(std::move(of_particles)) {}
 
-  std::size_t n_particles() const { return turning.size(); }
-  /// Whether contacts can rotate a particle.
-  bool turns(std::size_t i) const { return turning[i]; }
-
-  /// Whether any of the coordinates is a rotation.
-  bool any_turns() const
-  {
-    for (std::size_t k = 0; k < coordinates.column.size(); ++k) {
-      if (k % BLOCK >= D && coordinates.column[k] >= 0) return true;
-    }
-    return false;
-  }
+  std::size_t n_particles() const { return coordinates.turning_radius.size(); }
+  /// Whether contacts can rotate a particle, or any.
+  bool turns(std::size_t i) const { return coordinates.count(i) > D; }
+  bool any_turns() const { return coordinates.n() > D * n_particles(); }
 
   /// Calls `then` with each coordinate, and whether it is a rotation.
   template <class Then> void each_coordinate(const Then &then) const
   {
-    for (std::size_t k = 0; k < coordinates.column.size(); ++k) {
-      if (coordinates.column[k] >= 0) then(coordinates.column[k], k % BLOCK >= D);
+    for (std::size_t i = 0; i < n_particles(); ++i) {
+      for (int k = 0; k < coordinates.count(i); ++k) then(coordinates.first[i] + k, k >= D);
     }
   }
 
@@ -88,19 +88,19 @@ template <int D> class BasePoses {
   Vec<D> shift(const Displacement &at, std::size_t i) const
   {
     Vec<D> by;
-    for (int k = 0; k < D; ++k) by[k] = component(at, i, k);
+    std::copy_n(at.x + coordinates.first[i], D, by.c);
     return by;
   }
 
   /// Rotation vector of a particle, in space coordinates.
   Torque<D> turn(const Displacement &at, std::size_t i) const
   {
+    if (!turns(i)) return {};
+    const double *const turned = at.x + coordinates.first[i] + D;
     Torque<D> by;
-    for (int k = 0; k < ROTATIONS<D>; ++k) {
-      by[k] = component(at, i, D + k) * coordinates.radians_per_length[i];
-    }
+    for (int k = 0; k < ROTATIONS<D>; ++k) by[k] = turned[k] * coordinates.radians_per_length[i];
     if constexpr (D == 3) {
-      if (along_bodies && turns(i)) {
+      if (along_bodies) {
         return by[0] * axis_of(i, 0) + by[1] * axis_of(i, 1) + by[2] * axis_of(i, 2);
       }
     }
@@ -172,11 +172,10 @@ template <int D> class BasePoses {
   {
     double most = 0.0;
     for (std::size_t i = 0; i < n_particles(); ++i) {
+      const double *const own = vector + coordinates.first[i];
       double force = 0.0, torque = 0.0;
-      for (int k = 0; k < BLOCK; ++k) {
-        const double value = component({vector, 0.0}, i, k);
-        (k < D ? force : torque) += value * value;
-      }
+      for (int k = 0; k < D; ++k) force += own[k] * own[k];
+      for (int k = D; k < coordinates.count(i); ++k) torque += own[k] * own[k];
       most = std::max({most, force, torque});
     }
     return std::sqrt(most);
@@ -186,14 +185,6 @@ template <int D> class BasePoses {
   /// Largest rotation of nearly round particles in one step, if their surface stays within its
   /// bound.
   static constexpr double WIDE = 1.0;
-
-  std::vector<char> turning;
-
-  double component(const Displacement &at, std::size_t i, int k) const
-  {
-    const std::int64_t c = coordinates.column[BLOCK * i + k];
-    return c < 0 ? 0.0 : at.x[c];
-  }
 
   static double angle_of(const Vec<1> &turn) { return turn[0]; }
   static double angle_of(const Vec<3> &turn) { return norm(turn); }

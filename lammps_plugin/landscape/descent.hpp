@@ -126,7 +126,8 @@ class Descent {
       Line line = search_along(step, sums);
       if (line.sums.is_refused()) return end(DescentOutcome::STALLED, std::move(sums));
       learn(line, sums);
-      about.move({line.x.data(), 0.0});
+      here += line.step;
+      if (by_newton || far || extended || !about.adds_up()) move_base();
       sums = std::move(line.sums);
     }
   }
@@ -203,12 +204,14 @@ class Descent {
   };
 
   struct Line {
-    Vector x;
+    Vector step;
     LandscapeSums sums;
     double factor;
   };
 
   LocalEnergyModel &about;
+  Vector here = Vector::Zero(static_cast<Eigen::Index>(about.n()));  // from the base
+  bool far = false;  // whether pairs were renewed since the base last moved
   DescentStop stop;
   NewtonSystem system;
   QuasiNewton memory;
@@ -229,12 +232,22 @@ class Descent {
 
   DescentEnd end(DescentOutcome outcome, LandscapeSums sums)
   {
+    move_base();
     return {outcome,
             std::move(sums),
             std::move(rows),
             evaluations,
             system.factorisations + preconditioned,
             system.products};
+  }
+
+  /// Moves the base along: seldom, as long as doubles hold the displacements from there and
+  /// nothing else needs it.
+  void move_base()
+  {
+    about.move({here.data(), 0.0});
+    here.setZero();
+    far = false;
   }
 
   double residual() const { return rows.back().residual; }
@@ -252,6 +265,7 @@ class Descent {
       return;
     }
     by_newton = !by_newton;
+    move_base();
     best = evaluations;
     taken_over = rows.back();
   }
@@ -298,8 +312,8 @@ class Descent {
   /// fill-in nearly as good as complete ones, at a fraction of the price.
   void precondition()
   {
-    const Vector origin = Vector::Zero(static_cast<Eigen::Index>(about.n()));
-    about.differentiate({origin.data(), 0.0}, Fill::NONE);
+    move_base();
+    about.differentiate({here.data(), 0.0}, Fill::NONE);
     Vector shift = SOFT * about.largest_of_kind();
     // The error of incomplete factors is of the same size for all coordinates.
     if (!about.has_complete_factors()) shift.setConstant(shift.maxCoeff());
@@ -327,7 +341,8 @@ class Descent {
     const Vector step = along * OFF_SADDLE * overlap / falling->cwiseAbs().maxCoeff() * *falling;
     LandscapeSums there = evaluate(step);
     if (there.is_refused()) return false;
-    about.move({step.data(), 0.0});
+    here += step;
+    move_base();
     sums = std::move(there);
     memory.forget();
     ++saddles;
@@ -339,20 +354,18 @@ class Descent {
     if (by_newton) {
       system.learn(line.factor, line.sums.n_bonds > from.n_bonds);
     } else {
-      memory.learn(line.x, line.sums.gradient - from.gradient);
+      memory.learn(line.step, line.sums.gradient - from.gradient);
     }
   }
 
-  LandscapeSums first()
-  {
-    const Vector origin = Vector::Zero(static_cast<Eigen::Index>(about.n()));
-    return evaluate(origin);
-  }
+  LandscapeSums first() { return evaluate(here); }
 
-  LandscapeSums evaluate(const Vector &x)
+  /// Evaluates at a step from here.
+  LandscapeSums evaluate(const Vector &step)
   {
+    const Vector x = here + step;
     const Displacement at{x.data(), 0.0};
-    about.renew_pairs(at);
+    far |= about.renew_pairs(at);
     ++evaluations;
     LandscapeSums sums = about.evaluate(at, extended);
     if (!extended && !sums.is_refused() && needs_more_digits(sums)) {
@@ -428,7 +441,7 @@ class Descent {
     double factor = by_newton ? reach : 1.0;
     for (int n = 1;; ++n) {
       Line line{factor * step, {}, factor};
-      line.sums = evaluate(line.x);
+      line.sums = evaluate(line.step);
       const bool refused = line.sums.is_refused();
       const double here = refused ? INFINITY : line.sums.gradient.dot(step);
       const bool is_good = std::abs(here) <= 0.9 * std::abs(slope) || (here < 0.0 && factor == 1.0);

@@ -109,9 +109,9 @@ KinkThere kink_of(const Pairs &posed, std::size_t p, const std::int64_t *particl
   found.column.fill(-1);
   for (int side = 0; side < 2; ++side) {
     const double scale = coordinates.radians_per_length[particles[side]];
-    for (int k = 0; k < BLOCK; ++k) {
+    for (int k = 0; k < coordinates.count(particles[side]); ++k) {
       const int c = BLOCK * side + k;
-      found.column[c] = coordinates.column[BLOCK * particles[side] + k];
+      found.column[c] = coordinates.first[particles[side]] + k;
       const auto slope = [&](const auto &of) {
         if (k < D) return side == 0 ? -of.force[k] : of.force[k];
         return -scale * (side == 0 ? of.torque_i : of.torque_j)[k - D];

@@ -47,6 +47,8 @@ class LocalEnergyModel {
   virtual void move_to(const Poses &poses) = 0;
   /// Moves the base to a nearby point.
   virtual void move(const Displacement &at) = 0;
+  /// Whether displacements from one base to the next add up: rotations in 3D do not.
+  virtual bool adds_up() const = 0;
   /// Stores the base, from which `deform` begins.
   virtual void hold() = 0;
   virtual bool has_held() const = 0;
@@ -55,7 +57,8 @@ class LocalEnergyModel {
   /// rotate.
   virtual void deform(const std::vector<long double> &matrix, const double *turns) = 0;
   /// Renews the pairs if any that may touch at a point could be missing, before all else there.
-  virtual void renew_pairs(const Displacement &at) = 0;
+  /// Returns whether it did.
+  virtual bool renew_pairs(const Displacement &at) = 0;
   /// Forgets all pairs, so that results depend on the base alone, to the last bit.
   virtual void forget_pairs() = 0;
 

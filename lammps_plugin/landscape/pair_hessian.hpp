@@ -113,10 +113,9 @@ template <class Model, int D> class PairHessian {
   std::unique_ptr<BlockSystem> block_system(const std::vector<char> &used, Fill with) const
   {
     const bool is_complete = with == Fill::COMPLETE;
-    const BlockPlan plan{near.coordinates.column,
+    const BlockPlan plan{near.coordinates.first,
                          pairs.particles,
                          used,
-                         near.n_particles(),
                          BLOCK,
                          with,
                          is_complete ? near.in_box() : std::vector<double>{}};
@@ -250,10 +249,9 @@ template <class Model, int D> class PairHessian {
   /// Adds the force by which the strain pulls the first or second particle of a pair.
   template <class Pull> void add_pull(std::size_t p, int side, const Pull &pull)
   {
-    const std::int64_t *const own = &near.coordinates.column[BLOCK * pairs.particles[2 * p + side]];
-    for (int k = 0; k < Pull::RowsAtCompileTime; ++k) {
-      if (own[k] >= 0) pulled[own[k]] += pull[k];
-    }
+    const std::size_t i = pairs.particles[2 * p + side];
+    const int n = std::min<int>(Pull::RowsAtCompileTime, near.coordinates.count(i));
+    for (int k = 0; k < n; ++k) pulled[near.coordinates.first[i] + k] += pull[k];
   }
 
   /// Sets the Hessian and what the strain does to the sums over all pairs. False if its blocks lack
@@ -261,7 +259,7 @@ template <class Model, int D> class PairHessian {
   bool add_pairs(const Moved &posed, double strain, const Start *starts, Team *by)
   {
     present->clear();
-    pulled = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(near.coordinates.n));
+    pulled = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(near.coordinates.n()));
     pulled_back = 0.0;
     std::optional<TurnedBodies<Moved>> turned_bodies;
     if (near.any_turns()) turned_bodies.emplace(posed);

@@ -31,10 +31,9 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   using Law = typename Model::Law;
 
   /// `skin_of_pairs` is the distance of surfaces within which pairs are listed.
-  VicinityOf(std::vector<Shape> particle_shapes, Coordinates names, Laws<Law> contact_laws,
-             double skin_of_pairs) :
-      shapes(std::move(particle_shapes)), near(std::move(names), turning(shapes)),
-      skin(skin_of_pairs), laws(std::move(contact_laws))
+  VicinityOf(std::vector<Shape> particle_shapes, Laws<Law> contact_laws, double skin_of_pairs) :
+      shapes(std::move(particle_shapes)), near(coordinates_of(shapes)), skin(skin_of_pairs),
+      laws(std::move(contact_laws))
   {
     for (const Shape &shape : shapes) {
       reach = std::max(reach, 2.0 * Model::template outer_radius<D>(shape));
@@ -44,7 +43,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   VicinityOf &operator=(const VicinityOf &) = delete;
 
   int dimension() const override { return D; }
-  std::size_t n() const override { return near.coordinates.n; }
+  std::size_t n() const override { return near.coordinates.n(); }
   std::size_t n_particles() const override { return shapes.size(); }
   bool has_base() const override { return near.base.position[0].size() == D * shapes.size(); }
   const Poses &poses() const override { return near.base; }
@@ -62,6 +61,8 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     if (has_pairs()) measure_pairs();
   }
 
+  bool adds_up() const override { return D == 2 || !near.any_turns(); }
+
   void hold() override { held = near.base; }
   bool has_held() const override { return !held.position[0].empty(); }
 
@@ -78,18 +79,19 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     if (has_pairs()) measure_pairs();
   }
 
-  void renew_pairs(const Displacement &at) override
+  bool renew_pairs(const Displacement &at) override
   {
     if (!has_pairs()) {
       const std::vector<double> origin(n());
       find({origin.data(), 0.0});
       choose({origin.data(), 0.0});
     }
-    if (!pairs.is_beyond(near, at)) return;
+    if (!pairs.is_beyond(near, at)) return false;
     // Chosen at the same points whenever the wide ones were found: factors depend on the choice.
     wide.measure(near);
     if (wide.is_beyond(near, at, skin)) find(at);
     choose(at);
+    return true;
   }
 
   void forget_pairs() override { moved.reset(); }
@@ -236,10 +238,13 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   PairHessian<Model, D> hessian{near, pairs};
   std::unique_ptr<Team> team;
 
-  static std::vector<char> turning(const std::vector<Shape> &of)
+  static Coordinates coordinates_of(const std::vector<Shape> &of)
   {
-    std::vector<char> found;
-    for (const Shape &shape : of) found.push_back(Model::template turns<D>(shape));
+    Coordinates found;
+    for (const Shape &shape : of) {
+      found.add<D>(Model::template rotation_length<D>(shape),
+                   Model::template turning_radius<D>(shape));
+    }
     return found;
   }
 
@@ -305,17 +310,14 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
   template <class S>
   Eigen::VectorXd gradient(const PairSums<D, S> &sums, const Displacement &at) const
   {
-    constexpr int BLOCK = BasePoses<D>::BLOCK;
-    Eigen::VectorXd found = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(n()));
+    Eigen::VectorXd found(static_cast<Eigen::Index>(n()));
     for (std::size_t i = 0; i < shapes.size(); ++i) {
-      Torque<D, S> turning{};
-      if (near.turns(i)) turning = near.along_rotations(at, i, sums.torque[i]);
-      for (int k = 0; k < BLOCK; ++k) {
-        const std::int64_t c = near.coordinates.column[BLOCK * i + k];
-        if (c < 0) continue;
-        const S by =
-            k < D ? sums.force[i][k] : turning[k - D] * near.coordinates.radians_per_length[i];
-        found[c] = static_cast<double>(-by);
+      double *const own = found.data() + near.coordinates.first[i];
+      for (int k = 0; k < D; ++k) own[k] = static_cast<double>(-sums.force[i][k]);
+      if (!near.turns(i)) continue;
+      const Torque<D, S> turning = near.along_rotations(at, i, sums.torque[i]);
+      for (int k = 0; k < ROTATIONS<D>; ++k) {
+        own[D + k] = static_cast<double>(-turning[k] * near.coordinates.radians_per_length[i]);
       }
     }
     return found;

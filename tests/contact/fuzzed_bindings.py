@@ -168,16 +168,11 @@ def probes(fuzz, dimension):
 def of_vicinity(fuzz, of, dimension, poses):
     """Call the methods of a local energy model in any order, before and after it has a base and pairs."""
     n_turns = 1 if dimension == 2 else 3
-    column = np.arange(3 * (dimension + n_turns)).reshape(3, -1)
-    lengths = {"rotation_length": np.ones(3), "turning_radius": np.ones(3)}
-    about = fuzz.call(
-        "local_energy_model", of.local_energy_model, column=column, **lengths, skin=0.3
-    )
+    about = fuzz.call("local_energy_model", of.local_energy_model, skin=0.3)
     if about is None:
-        about = particles(type(of), dimension).local_energy_model(
-            column, np.ones(3), np.ones(3), 0.3
-        )
-    n, held = column.size, {"factors": None}
+        of = particles(type(of), dimension)
+        about = of.local_energy_model(0.3)
+    n, held = 3 * dimension + n_turns * np.count_nonzero(of.rotation_length), {"factors": None}
 
     def deform():
         matrix = np.stack([np.eye(dimension), np.zeros((dimension, dimension))])

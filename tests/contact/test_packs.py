@@ -46,6 +46,11 @@ def superellipsoids(rng, dimension, p=1.0):
     return replace(packing, diameters=diameters)
 
 
+def spherocylinders(rng, dimension):
+    """Rods with the sizes and separations of those pairs."""
+    return PairPacking.of(rng, every_kind(rng, dimension))
+
+
 def sums(monkeypatch, instructions, packing, sides):
     monkeypatch.setenv("JAMSHAPE_SIMD", instructions)
     return packing.sums(sides, K_E, extended=False)
@@ -70,8 +75,7 @@ def compare(monkeypatch, instructions, packing, sides, rounding=0.0):
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("sides", [1, 2])
 def test_packs_of_rods_give_what_pairs_give_alone(instructions, dimension, sides, monkeypatch):
-    rng = np.random.default_rng([18, dimension])
-    packing = PairPacking.of(rng, every_kind(rng, dimension))
+    packing = spherocylinders(np.random.default_rng([18, dimension]), dimension)
     # Logarithms and powers, which two bonds need, are the library's for pairs alone.
     compare(monkeypatch, instructions, packing, sides, rounding=0.0 if sides == 1 else 1e-14)
 
@@ -86,9 +90,12 @@ def test_packs_of_ellipsoids_give_what_pairs_give_alone(instructions, dimension,
 
 @each_set
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_packs_where_all_are_round_give_what_pairs_give_alone(instructions, dimension, monkeypatch):
+@pytest.mark.parametrize("made", [spherocylinders, superellipsoids])
+def test_packs_where_all_are_round_give_what_pairs_give_alone(
+    instructions, made, dimension, monkeypatch
+):
     """To the last bit, without torques; some pairs have the same centre."""
-    packing = superellipsoids(np.random.default_rng([6, dimension]), dimension)
+    packing = made(np.random.default_rng([6, dimension]), dimension)
     packing = replace(packing, diameters=np.repeat(packing.diameters[:, :1], 3, axis=1))
     compare(monkeypatch, instructions, packing, 1)
     assert sums(monkeypatch, instructions, packing, 1)["crossing"] >= 0

@@ -203,12 +203,8 @@ def test_a_network_of_contacts_that_is_none_is_refused():
 # --- landscapes and factors -------------------------------------------------------------------
 
 
-COLUMN = np.arange(9).reshape(N, 3)
-
-
-def local_model(column=COLUMN, length=1.0, skin=0.5):
-    lengths = np.full(N, length)
-    return particles(_contact.Spherocylinders, 2).local_energy_model(column, lengths, lengths, skin)
+def local_model(skin=0.5):
+    return particles(_contact.Spherocylinders, 2).local_energy_model(skin)
 
 
 def about_a_base():
@@ -218,15 +214,7 @@ def about_a_base():
     return of, given
 
 
-def test_coordinates_that_are_not_numbered_once_each_are_refused():
-    for wrong in (COLUMN + 1, COLUMN - 2, COLUMN // 2, COLUMN * 1000):
-        with pytest.raises(ValueError, match="column does not number the coordinates"):
-            local_model(wrong)
-    with pytest.raises(ValueError, match="do not have shapes"):
-        local_model(COLUMN[:2])
-    for bad in BAD_NUMBERS:
-        with pytest.raises(ValueError, match="of rotation_length is"):
-            local_model(length=bad)
+def test_skins_that_are_no_lengths_are_refused():
     for bad in (*BAD_NUMBERS, 0.0, -1.0):
         with pytest.raises(ValueError, match=r"skin is .*, expected a positive length"):
             local_model(skin=bad)
@@ -277,9 +265,10 @@ def test_stages_and_factors_of_another_size_are_refused():
             of.solve_stage(stage(**{name: np.zeros(8)}), None, 0)
         with pytest.raises(ValueError, match="a vector of a stage is nan"):
             of.solve_stage(stage(**{name: np.full(9, np.nan)}), None, 0)
-    held = local_model(np.where(COLUMN < 6, COLUMN, -1))
-    held.move_to(**given)
-    fewer = held.factorise(np.zeros(6), 0.0, np.ones(6))
+    discs = _contact.Spherocylinders(np.full((N, 3), 2.0), np.zeros((N, 0)), 2, 1.0, 1)
+    round_ones = discs.local_energy_model(0.5)
+    round_ones.move_to(**given)
+    fewer = round_ones.factorise(np.zeros(6), 0.0, np.ones(6))
     with pytest.raises(ValueError, match="right does not have"):
         fewer.solve(np.ones((1, 9)))
     with pytest.raises(ValueError, match="factors have another number of coordinates"):
@@ -344,11 +333,11 @@ def test_teams_of_no_size_are_refused(threads):
         local_model().share(threads)
 
 
-def test_particles_without_coordinates_have_an_empty_gradient():
+def test_no_particles_have_an_empty_gradient():
     """Arrays without rows have no place to begin at."""
-    _, given = about_a_base()
-    of = local_model(np.full_like(COLUMN, -1))
-    of.move_to(**given)
+    of = _contact.Spherocylinders(np.zeros((0, 3)), np.zeros((0, 0)), 2, 1.0, 1)
+    of = of.local_energy_model(0.5)
+    of.move_to(np.zeros((2, 0, 2)), np.zeros((2, 0, 1)), split(poses(2))["cell"])
     assert of.evaluate(np.zeros(0), 0.0, False)[1].shape == (0,)
     assert _contact.find_rattlers(
         0, 2, np.zeros((0, 2), int), np.zeros((0, 3)), np.zeros((0, 2), bool)

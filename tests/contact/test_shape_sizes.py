@@ -93,13 +93,16 @@ def test_bad_particles_are_refused(shape, change, sentence):
         shape(**(arguments | change))
 
 
-def test_vicinities_have_coordinates_of_their_space():
-    for dimension, columns in ((2, 3), (3, 6)):
-        shape = _contact.Dimers(np.ones((2, 3)), np.ones(2), dimension, 1.0, 1)
-        shape.local_energy_model(
-            np.arange(2 * columns).reshape(2, columns), np.ones(2), np.ones(2), 0.1
+def test_coordinates_are_displacements_and_rotations_of_those_that_turn():
+    for dimension, n in ((2, 3 + 2), (3, 6 + 3)):
+        diameters = np.array([[2.0, 1.0, 1.0], [1.0, 1.0, 1.0]])
+        model = _contact.Dimers(diameters, np.ones(2), dimension, 1.0, 1).local_energy_model(0.1)
+        turn = np.zeros((2, 2, 1 if dimension == 2 else 4))
+        turn[0, :, 0] = 1.0
+        position = np.stack([np.eye(2, dimension), np.zeros((2, dimension))])
+        model.move_to(
+            position, turn, np.stack([9 * np.eye(dimension), np.zeros((dimension, dimension))])
         )
-        with pytest.raises(ValueError, match=r"do not have shapes \(N, 3\), in space \(N, 6\)"):
-            shape.local_energy_model(
-                np.zeros((2, 9 - columns), np.int64), np.ones(2), np.ones(2), 0.1
-            )
+        assert model.evaluate(np.zeros(n), 0.0, False)[1].shape == (n,)
+        with pytest.raises(ValueError, match=f"expected one for each of {n} coordinates"):
+            model.evaluate(np.zeros(n + 1), 0.0, False)

@@ -29,6 +29,14 @@ template <int D> struct BodiesOfPack {
   }
 };
 
+/// The laws of the pairs of a block from `first` on.
+template <int D>
+SpherocylinderLawOf<Pack> laws_of(const SpherocylinderLaw &law, const ContactBlock<D> &block,
+                                  int first)
+{
+  return {{Pack::load(block.k_e + first), law.bond.power}, law.sides, law.shortcuts};
+}
+
 /// The pairs of a block from `first` on.
 template <int D>
 SpherocylinderContact<D, Pack> pairs_of(const SpherocylinderBody<D> *bodies,
@@ -38,9 +46,22 @@ SpherocylinderContact<D, Pack> pairs_of(const SpherocylinderBody<D> *bodies,
   const BodiesOfPack<D> i(bodies, block.i + first), j(bodies, block.j + first);
   SpinePair<D, Pack> pair{{}, i.axis, i.half_length, j.axis, j.half_length};
   for (int a = 0; a < D; ++a) pair.r[a] = Pack::load(block.separation[a] + first);
-  const SpherocylinderLawOf<Pack> of_lanes{
-      {Pack::load(block.k_e + first), law.bond.power}, law.sides, law.shortcuts};
-  return {pair, i.radius, j.radius + block.margin, of_lanes};
+  return {pair, i.radius, j.radius + block.margin, laws_of(law, block, first)};
+}
+
+/// The same of discs (spheres).
+template <int D>
+SpherocylinderContact<D, Pack> discs_of(const SpherocylinderBody<D> *bodies,
+                                        const SpherocylinderLaw &law, const ContactBlock<D> &block,
+                                        int first)
+{
+  const auto radii = [&](const int *index) {
+    return Pack::from([&](int k) { return bodies[index[k]].radius; });
+  };
+  SpinePair<D, Pack> pair{};
+  for (int a = 0; a < D; ++a) pair.r[a] = Pack::load(block.separation[a] + first);
+  return {pair, radii(block.i + first), radii(block.j + first) + block.margin,
+          laws_of(law, block, first)};
 }
 
 }  // namespace
@@ -51,6 +72,12 @@ template <InstructionSet SET, int D>
 [[gnu::flatten]] void find_rod_contacts(const SpherocylinderBody<D> *bodies,
                                         const SpherocylinderLaw &law, ContactBlock<D> &block)
 {
+  if (!block.turns) {
+    block.find(LANES, [&](const ContactBlock<D> &of, int first) {
+      return discs_of<D>(bodies, law, of, first).evaluate_round_lanes();
+    });
+    return;
+  }
   block.find(
       LANES,
       [&](const ContactBlock<D> &of, int first) {

@@ -195,6 +195,17 @@ template <int D, class S> class SpherocylinderContact {
     return lanes;
   }
 
+  /// Evaluates lanes of discs (spheres).
+  CentralLanes<D, S> evaluate_round_lanes() const
+  {
+    const Feet<D, S> centres = feet_of_discs();
+    CentralLanes<D, S> lanes;
+    lanes.touching = touches(centres.distance_sq);
+    lanes.alone = lanes.touching & is_coincident(centres);
+    lanes.bond_force = add_central(lanes, centres, sqrt(centres.distance_sq), whole()).size;
+    return lanes;
+  }
+
  private:
   SpinePair<D, S> pair;
   Plain<S> radius_i, reach;
@@ -226,10 +237,12 @@ template <int D, class S> class SpherocylinderContact {
     return feet.distance_sq <= COINCIDENT * reach * COINCIDENT * reach;
   }
 
+  Feet<D, S> feet_of_discs() const { return {S(0.0), S(0.0), pair.r, norm_sq(pair.r)}; }
+
   /// Result of the general path for two spines of zero length, without the search for feet.
   Found discs() const
   {
-    const Feet<D, S> centres{0.0, 0.0, pair.r, norm_sq(pair.r)};
+    const Feet<D, S> centres = feet_of_discs();
     if (!touches(centres.distance_sq)) return without(ContactStatus::APART);
     if (is_coincident(centres)) return without(ContactStatus::CROSSING);
     Found contact = without(ContactStatus::TOUCHING);
@@ -376,6 +389,15 @@ template <int D, class S> class SpherocylinderContact {
   template <class To>
   Load add_load(To &to, const Feet<D, S> &feet, const S &distance, const Part &part) const
   {
+    const Load load = add_central(to, feet, distance, part);
+    to.torque_i += feet.s * cross(pair.u_i, load.force);
+    to.torque_j -= feet.t * cross(pair.u_j, load.force);
+    return load;
+  }
+  /// The same without torques.
+  template <class To>
+  Load add_central(To &to, const Feet<D, S> &feet, const S &distance, const Part &part) const
+  {
     const S overlap = overlap_at(distance);
     const Vec<D, S> normal = (1.0 / sqrt(feet.distance_sq)) * feet.delta;
     // In dual numbers the slope of the law is left out here: `own_stiffness` accounts for it, so
@@ -387,8 +409,6 @@ template <int D, class S> class SpherocylinderContact {
     const S energy = part.share * law.bond.energy(overlap);
     to.energy += energy;
     to.force += force;
-    to.torque_i += feet.s * cross(pair.u_i, force);
-    to.torque_j -= feet.t * cross(pair.u_j, force);
     return {normal, force, overlap, size, energy};
   }
 

@@ -105,9 +105,7 @@ class LocalEnergyModel:
 
     def __init__(self, landscape: Landscape, base: State, *, along_bodies: bool = False) -> None:
         self.landscape, self._along_bodies = landscape, along_bodies
-        self._compiled = landscape.bodies.local_energy_model(
-            landscape.column, landscape.rotation_length, landscape.turning_radius, landscape.skin
-        )
+        self._compiled = landscape.bodies.local_energy_model(landscape.skin)
         self._compiled.share(threads())
         if along_bodies:
             self._compiled.follow_bodies()

@@ -202,9 +202,14 @@ def slides(monkeypatch):
     return energies
 
 
+def long_rods():
+    packing, state = quickly_squeezed(24, 4, 0.78)
+    return Landscape(packing), state
+
+
 @pytest.mark.usefixtures("slides")
 def test_a_search_resumed_while_a_packing_slides_gives_the_same_bits():
-    landscape, state = start_of("16 rods")
+    landscape, state = long_rods()
     target = Target(1e-12)
     points = [copied(s) for s in extrapolation(landscape, Search(state, target.step), target)]
     whole = points.pop().minimum
@@ -220,7 +225,7 @@ def test_a_search_resumed_while_a_packing_slides_gives_the_same_bits():
 
 
 def test_a_packing_that_slides_is_compressed_to_the_energy_it_should_have(slides):
-    landscape, state = start_of("16 rods")
+    landscape, state = long_rods()
     for search in extrapolation(landscape, Search(state, 5e-4), Target(1e-12)):
         if search.leading is not None and search.leading.unfinished is not None:
             before, slid = len(slides), search.leading.unfinished
