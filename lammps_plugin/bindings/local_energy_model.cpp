@@ -43,7 +43,7 @@ nb::object evaluate(LocalEnergyModel &of, const Array1<double> &x, double strain
 {
   const Displacement at = checked(of, x, strain);
   of.renew_pairs(at);
-  return tuple_of(of.evaluate(at, extended));
+  return tuple_of(of.evaluate(at, {extended, true}));
 }
 
 std::shared_ptr<Factors> factorise(LocalEnergyModel &of, const Array1<double> &x, double strain,

@@ -233,6 +233,7 @@ class Descent {
   DescentEnd end(DescentOutcome outcome, LandscapeSums sums)
   {
     move_base();
+    if (!sums.is_refused()) sums = about.evaluate({here.data(), 0.0}, {extended, true});
     return {outcome,
             std::move(sums),
             std::move(rows),
@@ -367,11 +368,11 @@ class Descent {
     const Displacement at{x.data(), 0.0};
     far |= about.renew_pairs(at);
     ++evaluations;
-    LandscapeSums sums = about.evaluate(at, extended);
+    LandscapeSums sums = about.evaluate(at, {extended, false});
     if (!extended && !sums.is_refused() && needs_more_digits(sums)) {
       extended = true;
       ++evaluations;
-      return about.evaluate(at, extended);
+      return about.evaluate(at, {extended, false});
     }
     return sums;
   }

@@ -25,10 +25,16 @@ struct LandscapeSums {
   double strain_gradient, bond_force;
   std::size_t n_bonds;
   std::array<std::int64_t, 2> crossing, unconverged;
-  std::vector<double> virial;  // (D, D) sum of r (x) force, with the trace -strain_gradient
+  std::vector<double> virial;  // (D, D) sum of r (x) force, with the trace -strain_gradient: both
+                               // zero where they were not asked for
 
   bool crosses() const { return crossing[0] >= 0; }
   bool is_refused() const { return crosses() || unconverged[0] >= 0; }
+};
+
+/// Whether to evaluate in extended precision, and the virial, too.
+struct EvaluationOptions {
+  bool extended, virial;
 };
 
 /// Energy of a packing and its derivatives as functions of n coordinates about a base: the
@@ -79,7 +85,7 @@ class LocalEnergyModel {
   /// this number, but on nothing else.
   virtual void share(std::size_t threads) = 0;
 
-  virtual LandscapeSums evaluate(const Displacement &at, bool extended) const = 0;
+  virtual LandscapeSums evaluate(const Displacement &at, const EvaluationOptions &with) const = 0;
 
   /// Whether energies have kinks whose two smooth pieces are known.
   virtual bool has_kinks() const = 0;

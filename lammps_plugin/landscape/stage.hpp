@@ -218,7 +218,7 @@ class StageSolver {
     const Displacement at{x.data(), 0.0};
     about.renew_pairs(at);
     ++evaluations;
-    LandscapeSums sums = about.evaluate(at, stage.extended);
+    LandscapeSums sums = about.evaluate(at, {stage.extended, true});
     Vector gradient = sums.gradient + stage.drag.cwiseProduct(x - stage.centre);
     return {std::move(x), std::move(sums), std::move(gradient)};
   }

@@ -115,14 +115,16 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     team = threads > 1 ? std::make_unique<Team>(threads) : nullptr;
   }
 
-  LandscapeSums evaluate(const Displacement &at, bool extended) const override
+  LandscapeSums evaluate(const Displacement &at, const EvaluationOptions &with) const override
   {
     Team *const by = team_for(pairs.list().n);
-    if (!extended) {
-      return sums_of(sum_over(parts, moved_to(at), remembers ? starts.data() : nullptr, by), at);
+    if (!with.extended) {
+      Start *const from = remembers ? starts.data() : nullptr;
+      return sums_of(sum_over(parts, moved_to(at), with.virial, from, by), at);
     }
     std::vector<PairSums<D, long double>> in_long;
-    return sums_of(sum_over(in_long, posed_at<long double>(pairs, at), nullptr, by), at);
+    const auto posed = posed_at<long double>(pairs, at);
+    return sums_of(sum_over(in_long, posed, with.virial, nullptr, by), at);
   }
 
   bool has_kinks() const override { return HAS_KINKS; }
