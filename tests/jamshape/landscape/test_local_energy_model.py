@@ -368,3 +368,21 @@ def test_factors_contain_pairs_that_were_apart_when_the_first_ones_were_made(alp
     expected = fresh.factorise(x, 0.0, diagonal).solve(right)
     assert not np.allclose(expected, apart, rtol=0.1)
     assert model.factorise(x, 0.0, diagonal).solve(right) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("evaluations", [5, 40])
+def test_a_minimisation_that_is_cut_short_ends_with_the_sums_of_its_state(packing, evaluations):
+    """The base moves seldom, and the virial is not summed on the way."""
+    landscape, state = Landscape(packing), State.of(packing)
+    x = 0.02 * np.random.default_rng(5).normal(size=landscape.size)
+    found = minimise(
+        landscape, landscape.displaced(state, x), "auto", Stop(1e-14, 0.0, evaluations)
+    )
+    there = Landscape(packing).evaluate(found.state)
+    last = found.history.energy_density[-1]
+    assert found.energy_density == pytest.approx(last, rel=1e-11, abs=1e-28)
+    assert found.evaluation.energy == pytest.approx(there.energy, rel=1e-11, abs=1e-28)
+    for name in ("gradient", "virial", "strain_gradient"):
+        value = getattr(there, name)
+        atol = 1e-11 * max(np.abs(value).max(), 1e-4)
+        np.testing.assert_allclose(getattr(found.evaluation, name), value, rtol=0, atol=atol)

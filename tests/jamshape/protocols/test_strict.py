@@ -146,9 +146,9 @@ def energies_beside(landscape, minimum, size):
     return np.array(energies) / landscape.evaluate(minimum).energy
 
 
-# 24, 245 and 32, 725 end on a kink, too, one side of which rises in second order only.
+# 430 and 1399 end on a kink, too, one side of which rises in second order only.
 @chosen_by_seed
-@pytest.mark.parametrize("seed", [7, pytest.param(1031, marks=pytest.mark.validate)])
+@pytest.mark.parametrize("seed", [678, pytest.param(1489, marks=pytest.mark.validate)])
 def test_minimum_on_a_kink_is_proven_by_its_two_sides(seed, tmp_path):
     """The tips of two rods are level: a bond passes from one to the other."""
     out = tmp_path / "packing.h5"
