@@ -9,8 +9,8 @@ along the eigenvector.
 import jamshape as js
 
 rods = js.Spherocylinders(alpha=6)
-packing = js.make_packing(rods, n=32, u0=1e-12, seed=4, progress=False)
+packing = js.make_packing(rods, n=32, u0=1e-12, seed=13, progress=False)
 modes = js.modes(packing)
-sliding = int(modes.in_band("low")[0])
+sliding = int(modes["parallel"].argmax())
 print(f"omega = {modes.omega[sliding]:.1g}, motion along rods {modes['parallel'][sliding]:.3f}")
 js.animate(modes, sliding, "mode.gif", dpi=70)
