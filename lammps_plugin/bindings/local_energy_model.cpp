@@ -8,7 +8,6 @@
 #include <memory>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/unique_ptr.h>
-#include <utility>
 
 namespace jamshape {
 

@@ -233,7 +233,10 @@ class Descent {
   DescentEnd end(DescentOutcome outcome, LandscapeSums sums)
   {
     move_base();
-    if (!sums.is_refused()) sums = about.evaluate({here.data(), 0.0}, {extended, true});
+    if (!sums.is_refused()) {
+      ++evaluations;
+      sums = about.evaluate({here.data(), 0.0}, {extended, true});
+    }
     return {outcome,
             std::move(sums),
             std::move(rows),

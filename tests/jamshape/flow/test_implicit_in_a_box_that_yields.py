@@ -161,7 +161,7 @@ def test_with_lasting_contacts_it_is_the_motion_of_lammps_to_second_order(
     assert bonds_of(start) == bonds_of(exact.packing(-1))
     assert abs(exact["p_yy"][-1] / exact["p_yy"][0] - 1) > 1e-3
     errors = []
-    for n in (16, 32, 64):  # in fewer, some rods move so far that steps are shortened
+    for n in (16, 32, 64):  # in fewer, steps are shortened where the box yields fast
         course = SlowShear(gdot, strain, tolerance=1e-5, largest_strain=1.0, method=method,
                            hold_pressure=1e-2, t_box=20.0)  # fmt: skip
         flow = fixed_steps(start, course, strain / gdot / n)
