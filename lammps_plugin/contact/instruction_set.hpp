@@ -24,7 +24,9 @@ inline bool machine_has(InstructionSet set)
 {
 #if defined(__x86_64__)
   __builtin_cpu_init();
-  if (set == InstructionSet::avx2) return __builtin_cpu_supports("avx2") != 0;
+  if (set == InstructionSet::avx2) {
+    return __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
+  }
   if (set == InstructionSet::avx512) {
     return __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512dq") != 0;
   }

@@ -25,6 +25,11 @@ class Factors {
   virtual double price() const = 0;
   /// Solution for a right-hand side (n,) in the coordinates.
   virtual Eigen::VectorXd solve(const Eigen::Ref<const Eigen::VectorXd> &right) const = 0;
+  /// A less accurate one, to precondition iterations.
+  virtual Eigen::VectorXd solve_nearly(const Eigen::Ref<const Eigen::VectorXd> &right) const
+  {
+    return solve(right);
+  }
 };
 
 /// Whether factors include all fill-in of the elimination, or only blocks that the matrix itself
@@ -72,15 +77,19 @@ struct BlockPattern {
   /// The number of those of a particle.
   int count(std::size_t i) const { return static_cast<int>(coordinate[i + 1] - coordinate[i]); }
 
-  /// Products of blocks in an elimination, over the blocks of the factor.
-  double products_per_block() const
+  /// The number of solutions that take as long as new factors, of blocks with this many rows. A
+  /// solution, which waits for memory, takes as long for one of them as this number of their
+  /// columns in products of two.
+  double price(int block) const
   {
+    constexpr double COLUMNS_PER_SOLUTION = 15.0;
     double products = 0.0;
     for (std::size_t j = 0; j < size(); ++j) {
       const double below = first[j + 1] - first[j];
       products += below * below;
     }
-    return products / static_cast<double>(std::max<std::size_t>(row.size(), 1));
+    const auto blocks = static_cast<double>(std::max<std::size_t>(row.size(), 1));
+    return block * products / blocks / COLUMNS_PER_SOLUTION;
   }
 
   /// The number of the matrix's block below a diagonal one in a row.
@@ -128,20 +137,9 @@ template <int BLOCK> const double *numbers_of(const std::vector<BlockOf<BLOCK>> 
   return blocks.empty() ? nullptr : blocks.data()->data();
 }
 
-/// A symmetric matrix: the blocks on its diagonal, and those below it, without fill-in.
-template <int BLOCK> struct BlockMatrix {
-  std::vector<BlockOf<BLOCK>> diagonal, below;
-
-  BlockView view(const BlockPattern &of) const
-  {
-    return {static_cast<int>(of.size()), of.own_first.data(), of.own_row.data(),
-            numbers_of<BLOCK>(diagonal), numbers_of<BLOCK>(below)};
-  }
-};
-
 /// A vector in the coordinates and its blocks, in the order of elimination; zero for coordinates
 /// that a particle does not have.
-template <int BLOCK> class BlockRows {
+template <int BLOCK, int STRIDE = stride_of(BLOCK)> class BlockRows {
  public:
   explicit BlockRows(const BlockPattern &of) : pattern(of), x(STRIDE * of.size()) {}
 
@@ -161,8 +159,6 @@ template <int BLOCK> class BlockRows {
   }
 
  private:
-  static constexpr std::size_t STRIDE = stride_of(BLOCK);
-
   const BlockPattern &pattern;
   std::vector<double> x;
 
@@ -181,11 +177,41 @@ template <int BLOCK> class BlockRows {
   }
 };
 
-/// Factors L D L^T of symmetric positive definite matrices of one pattern, block by block: three
-/// times faster than element by element. Pivots are single numbers, as without blocks, so that a
-/// particle constrained in one direction only costs no digits. Coordinates that a particle does not
-/// have need zeros in its blocks and 1 on the diagonal.
-template <int BLOCK> class BlockFactors : public Factors {
+/// A symmetric matrix: the blocks on its diagonal, and those below it, without fill-in.
+template <int BLOCK> struct BlockMatrix {
+  std::vector<BlockOf<BLOCK>> diagonal, below;
+
+  BlockView view(const BlockPattern &of) const
+  {
+    return {static_cast<int>(of.size()), of.own_first.data(), of.own_row.data(),
+            numbers_of<BLOCK>(diagonal), numbers_of<BLOCK>(below)};
+  }
+
+  /// Blocks on the diagonal plus those of a diagonal matrix, its rows in the order of elimination.
+  std::vector<BlockOf<BLOCK>> diagonal_plus(const BlockRows<BLOCK> &added) const
+  {
+    std::vector<BlockOf<BLOCK>> sum = diagonal;
+    for (std::size_t j = 0; j < sum.size(); ++j) {
+      for (int k = 0; k < BLOCK; ++k) sum[j](k, k) += added.row(j)[k];
+    }
+    return sum;
+  }
+};
+
+/// Factors L D L^T of symmetric positive definite matrices of one pattern. Pivots are single
+/// numbers, as without blocks, so that a particle constrained in one direction only costs no
+/// digits. Coordinates that a particle does not have need zeros in its blocks and 1 on the
+/// diagonal.
+template <int BLOCK> class Elimination : public Factors {
+ public:
+  /// Factors of a matrix plus a diagonal, its rows in the order of elimination. False, and no
+  /// factors, if a pivot is not positive: then the matrix is not positive definite (Sylvester's law
+  /// of inertia), if the fill is complete.
+  virtual bool factorise(const BlockMatrix<BLOCK> &matrix, const BlockRows<BLOCK> &added) = 0;
+};
+
+/// Factors block by block: three times faster than element by element.
+template <int BLOCK> class BlockFactors : public Elimination<BLOCK> {
  public:
   BlockFactors(std::shared_ptr<const BlockPattern> of, const BlockKernels &compiled) :
       pattern(std::move(of)), kernels(compiled), diagonal(pattern->size()),
@@ -194,23 +220,14 @@ template <int BLOCK> class BlockFactors : public Factors {
   {
   }
 
-  /// Factors of a matrix plus a diagonal, its rows in the order of elimination. False, and no
-  /// factors, if a pivot is not positive: then the matrix is not positive definite (Sylvester's law
-  /// of inertia), if the fill is complete.
-  bool factorise(const BlockMatrix<BLOCK> &matrix, const BlockRows<BLOCK> &added)
+  bool factorise(const BlockMatrix<BLOCK> &matrix, const BlockRows<BLOCK> &added) override
   {
-    diagonal = matrix.diagonal;
-    for (std::size_t j = 0; j < pattern->size(); ++j) {
-      for (int k = 0; k < BLOCK; ++k) diagonal[j](k, k) += added.row(j)[k];
-    }
+    diagonal = matrix.diagonal_plus(added);
     return kernels.factorise(matrix.view(*pattern), view());
   }
 
   std::size_t size() const override { return pattern->n(); }
-  double price() const override
-  {
-    return BLOCK * pattern->products_per_block() / PRODUCTS_PER_SOLUTION;
-  }
+  double price() const override { return pattern->price(BLOCK); }
 
   Eigen::VectorXd solve(const Eigen::Ref<const Eigen::VectorXd> &right) const override
   {
@@ -220,10 +237,6 @@ template <int BLOCK> class BlockFactors : public Factors {
   }
 
  private:
-  /// Products of two blocks in the time that a solution takes for one of them, times BLOCK: a
-  /// solution waits for memory.
-  static constexpr double PRODUCTS_PER_SOLUTION = 15.0;
-
   std::shared_ptr<const BlockPattern> pattern;
   BlockKernels kernels;
   // L below the pivots, which its diagonal holds.

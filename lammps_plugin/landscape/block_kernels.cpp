@@ -2,6 +2,8 @@
 
 #include "landscape/block_kernels.hpp"
 
+#include "landscape/dense_square.hpp"
+
 #include <cstring>
 
 namespace jamshape {
@@ -261,20 +263,12 @@ template <int BLOCK> bool eliminate(const FactorView &at, int j)
 {
   constexpr int SIZE = BLOCK * BLOCK;
   double *const block = at.diagonal + SIZE * j, *const inverse = at.inverse_pivots + BLOCK * j;
-  const auto l = [&](int r, int c) -> double & { return block[BLOCK * c + r]; };
-  for (int k = 0; k < BLOCK; ++k) {
-    if (!(l(k, k) > 0.0)) return false;
-    inverse[k] = 1.0 / l(k, k);
-    for (int c = k + 1; c < BLOCK; ++c) {
-      for (int r = c; r < BLOCK; ++r) l(r, c) -= l(r, k) * inverse[k] * l(c, k);
-    }
-    for (int r = k + 1; r < BLOCK; ++r) l(r, k) *= inverse[k];
-  }
+  if (!factorise_square(block, BLOCK, BLOCK, inverse)) return false;
   for (int b = at.first[j]; b < at.first[j + 1]; ++b) {
     Square<BLOCK> below;
     below.load(at.below + SIZE * b);
     for (int c = 1; c < BLOCK; ++c) {
-      for (int k = 0; k < c; ++k) below.column[c].take(below.column[k], l(c, k));
+      for (int k = 0; k < c; ++k) below.column[c].take(below.column[k], block[BLOCK * k + c]);
     }
     for (int c = 0; c < BLOCK; ++c) below.column[c].scale(inverse[c]);
     below.put(at.below + SIZE * b);

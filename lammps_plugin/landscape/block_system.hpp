@@ -3,6 +3,7 @@
 #include "landscape/block_factors.hpp"
 #include "landscape/conjugate_gradients.hpp"
 #include "landscape/elimination_order.hpp"
+#include "landscape/supernode_factors.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -54,7 +55,7 @@ struct BlockPlan {
 template <int BLOCK> class IteratedFactors : public Factors {
  public:
   IteratedFactors(std::shared_ptr<const BlockPattern> of, const BlockKernels &compiled,
-                  BlockMatrix<BLOCK> of_equations, std::shared_ptr<BlockFactors<BLOCK>> nearly) :
+                  BlockMatrix<BLOCK> of_equations, std::shared_ptr<Elimination<BLOCK>> nearly) :
       pattern(std::move(of)), kernels(compiled), matrix(std::move(of_equations)),
       near(std::move(nearly))
   {
@@ -85,7 +86,7 @@ template <int BLOCK> class IteratedFactors : public Factors {
   std::shared_ptr<const BlockPattern> pattern;
   BlockKernels kernels;
   BlockMatrix<BLOCK> matrix;
-  std::shared_ptr<BlockFactors<BLOCK>> near;
+  std::shared_ptr<Elimination<BLOCK>> near;
 };
 
 /// Block system of particles with only their first BLOCK coordinates.
@@ -164,19 +165,16 @@ template <int BLOCK, int D> class BlockSystemOf : public BlockSystem {
   std::shared_ptr<Factors> factors(const Eigen::VectorXd &added) override
   {
     const BlockRows<BLOCK> rows(*pattern, added);
-    const std::shared_ptr<BlockFactors<BLOCK>> found = spare();
+    const std::shared_ptr<Elimination<BLOCK>> found = spare();
     return found->factorise(hessian, rows) ? found : nullptr;
   }
 
   std::shared_ptr<Factors> iterated(const Eigen::VectorXd &added) override
   {
-    BlockMatrix<BLOCK> matrix = hessian;
-    const BlockRows<BLOCK> rows(*pattern, added);
-    for (std::size_t j = 0; j < pattern->size(); ++j) {
-      for (int k = 0; k < BLOCK; ++k) matrix.diagonal[j](k, k) += rows.row(j)[k];
-    }
+    BlockMatrix<BLOCK> matrix{hessian.diagonal_plus(BlockRows<BLOCK>(*pattern, added)),
+                              hessian.below};
     const double largest = (diagonal() + added).cwiseAbs().maxCoeff();
-    const std::shared_ptr<BlockFactors<BLOCK>> near = spare();
+    const std::shared_ptr<Elimination<BLOCK>> near = spare();
     // The preconditioner alone is shifted where its pivots need it.
     for (double shift = 0.0; std::isfinite(shift);
          shift = std::max(10.0 * shift, INCOMPLETE * largest)) {
@@ -199,7 +197,8 @@ template <int BLOCK, int D> class BlockSystemOf : public BlockSystem {
   std::shared_ptr<const BlockPattern> pattern;
   std::vector<int> block;  // (M,) block of each used pair below the diagonal
   BlockMatrix<BLOCK> hessian;
-  std::vector<std::shared_ptr<BlockFactors<BLOCK>>> made;
+  std::shared_ptr<const SupernodePattern> supernodes;
+  std::vector<std::shared_ptr<Elimination<BLOCK>>> made;
   BlockKernels kernels = block_kernels<BLOCK>();
 
   /// Places of the particles in the order of elimination: with little fill-in, if there will be
@@ -216,13 +215,25 @@ template <int BLOCK, int D> class BlockSystemOf : public BlockSystem {
   int place(std::size_t p, int side) const { return pattern->place[pairs[2 * p + side]]; }
 
   /// Factors in use nowhere else.
-  std::shared_ptr<BlockFactors<BLOCK>> spare()
+  std::shared_ptr<Elimination<BLOCK>> spare()
   {
     for (const auto &one : made) {
       if (one.use_count() == 1) return one;
     }
-    made.push_back(std::make_shared<BlockFactors<BLOCK>>(pattern, kernels));
+    made.push_back(new_factors());
     return made.back();
+  }
+
+  /// Supernodes are narrow in a plane: factors block by block take less time there.
+  std::shared_ptr<Elimination<BLOCK>> new_factors()
+  {
+    if constexpr (D == 3) {
+      if (pattern->fill == Fill::COMPLETE) {
+        if (!supernodes) supernodes = std::make_shared<SupernodePattern>(*pattern, BLOCK);
+        return std::make_shared<SupernodeFactors<BLOCK>>(pattern, supernodes);
+      }
+    }
+    return std::make_shared<BlockFactors<BLOCK>>(pattern, kernels);
   }
 };
 

@@ -239,7 +239,7 @@ class NewtonSystem {
     const auto times = [&](const Vector &along) -> Vector {
       return about.times(along) + shift * along;
     };
-    const auto solve_nearly = [&](const Vector &rest) { return near.solve(rest); };
+    const auto solve_nearly = [&](const Vector &rest) { return near.solve_nearly(rest); };
     Iterated found = conjugate_gradients(right, most, times, solve_nearly, is_done);
     products += static_cast<int>(found.n);
     return found;

@@ -77,6 +77,25 @@ def test_near_isostaticity_factors_take_over_from_iterations():
     assert remainders(newton, curvature.hessian, right, found).max() < 1e-8
 
 
+@cache
+def made_in_space(w1, n):
+    shape = js.Superellipsoids(p=1, w1=w1, w2=1)
+    return js.make_packing(shape, n=n, seed=1, u0=1e-5, progress=False)
+
+
+@pytest.mark.parametrize("instructions", _contact.instruction_sets())
+@pytest.mark.parametrize(
+    ("w1", "n"), [pytest.param(1, 600, id="spheres"), pytest.param(0.6, 170, id="spheroids")]
+)
+def test_complete_factors_in_space_solve_the_equations(w1, n, instructions, monkeypatch):
+    """Their supernodes differ in width, and none of them is a multiple of registers."""
+    monkeypatch.setenv("JAMSHAPE_SIMD", instructions)
+    newton, curvature = equations(made_in_space(w1, n), 1e-3)
+    right = right_sides(len(curvature.coupling))
+    found = newton.solve(right, 1e-300)  # which iterations do not reach
+    assert remainders(newton, curvature.hessian, right, found).max() < 1e-11
+
+
 @pytest.mark.parametrize("name", [*PRESSED, MANY])
 def test_coupling_is_that_of_the_landscape(name):
     newton, curvature = equations(packing_named(name), 1e-9)
