@@ -3,6 +3,7 @@
 #include "landscape/block_kernels.hpp"
 
 #include "landscape/dense_square.hpp"
+#include "landscape/single_precision.hpp"
 
 #include <cstring>
 
@@ -368,15 +369,6 @@ constexpr int AT_ONCE = 4;
 #endif
 constexpr int SUMS = 16;
 using Several = double __attribute__((vector_size(8 * AT_ONCE)));
-using SeveralSingle = float __attribute__((vector_size(4 * AT_ONCE)));
-
-Several in_doubles(const float *from)
-{
-  SeveralSingle v;
-  std::memcpy(&v, from, sizeof(v));
-  return __builtin_convertvector(v, Several);
-}
-
 double add_and_dot(int n, double by, const float *vector, const float *further, double *x)
 {
   Several sum[SUMS / AT_ONCE]{};  // in turns, since each addition waits for the one before
@@ -386,9 +378,9 @@ double add_and_dot(int n, double by, const float *vector, const float *further, 
       const int at = k + AT_ONCE * m;
       Several own;
       std::memcpy(&own, x + at, sizeof(own));
-      own += by * in_doubles(vector + at);
+      own += by * in_doubles<Several>(vector + at);
       std::memcpy(x + at, &own, sizeof(own));
-      sum[m] += own * in_doubles(further + at);
+      sum[m] += own * in_doubles<Several>(further + at);
     }
   }
   double rest = 0.0;

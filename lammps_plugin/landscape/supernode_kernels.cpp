@@ -3,6 +3,7 @@
 #include "landscape/supernode_kernels.hpp"
 
 #include "landscape/dense_square.hpp"
+#include "landscape/single_precision.hpp"
 
 #include <algorithm>
 #include <cstddef>
@@ -22,7 +23,6 @@ constexpr int LANES = 2, HIGH = 2, WIDE = 4;
 #endif
 static_assert(LANES * HIGH <= SUPERNODE_ROOM);
 using Lanes = double __attribute__((vector_size(8 * LANES)));
-using Singles = float __attribute__((vector_size(4 * LANES)));
 
 Lanes loaded(const double *from)
 {
@@ -31,12 +31,7 @@ Lanes loaded(const double *from)
   return v;
 }
 
-Lanes loaded(const float *from)
-{
-  Singles v;
-  std::memcpy(&v, from, sizeof(v));
-  return __builtin_convertvector(v, Lanes);
-}
+Lanes loaded(const float *from) { return in_doubles<Lanes>(from); }
 
 void put(const Lanes &v, double *to) { std::memcpy(to, &v, sizeof(v)); }
 
