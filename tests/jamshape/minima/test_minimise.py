@@ -9,6 +9,7 @@ from squeezed import quickly_squeezed
 from superellipsoid_packings import ellipsoids, octahedra_and_boxes, superellipses
 
 from jamshape.landscape import CrossingError, Landscape, State
+from jamshape.landscape.local_energy_model import DescentEnd, LocalEnergyModel
 from jamshape.minima import (
     METHODS,
     Outcome,
@@ -36,6 +37,23 @@ JAMMED = {
     "24 rods of alpha 1": (24, 1, 0.95),
     "32 rods of alpha 4": (32, 4, 0.98),
 }
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_after_a_stall_only_in_the_plane_newtons_method_alone_goes_on(dimension, monkeypatch):
+    packing = pressed(n=16, dimension=dimension)
+    landscape, state = Landscape(packing), State.of(packing)
+    stalled = DescentEnd(Outcome.STALLED.value, landscape.evaluate(state), rows=[])
+    monkeypatch.setattr(LocalEnergyModel, "descend", lambda *_: stalled)
+    handovers = []
+    monkeypatch.setattr(
+        "jamshape.minima.newton.DescentStop", lambda **stop: handovers.append(stop["newton_below"])
+    )
+    found = minimise(landscape, state, "auto", Stop(kinks=False))
+    assert found.outcome is Outcome.STALLED
+    first, second = handovers
+    assert first < 1
+    assert second == (np.inf if dimension == 2 else first)
 
 
 @pytest.fixture(params=JAMMED)
