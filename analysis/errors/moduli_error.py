@@ -80,9 +80,9 @@ def cases() -> list[Case]:
         *(Case("rods, alpha = 4", long, 64, u0, floppy=True) for u0 in (1e-8, 1e-9, 1e-10, 1e-12)),
         *(Case("rods, alpha = 1", short, 32, u0) for u0 in (1e-6, 1e-9, 1e-12)),
         Case("rods, alpha = 1", short, 16, 1e-8, dimension=3),
-        # Some bonds of seed 1 hardly overlap.
+        # Some bonds of seed 1 hardly overlap, and differences by steps through a gap are wrong.
         *(Case("dimers", dimers, 32, u0, seed=2) for u0 in (1e-6, 1e-9, 1e-12)),
-        Case("dimers", dimers, 16, 1e-8, dimension=3),
+        Case("dimers", dimers, 16, 1e-8, dimension=3, seed=2),
         *(Case("ellipses", ellipses, 32, u0) for u0 in (1e-6, 1e-10)),
         Case("superdisks", superdisks, 32, 1e-8),
         *(Case("spheroids", spheroids, 16, u0, dimension=3) for u0 in (1e-8, 1e-11)),
