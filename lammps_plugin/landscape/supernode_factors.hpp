@@ -111,7 +111,7 @@ template <int BLOCK> class SupernodeFactors : public Elimination<BLOCK> {
     return solved(right, view());
   }
 
-  /// Single precision halves the time, which is that of reading the factors.
+  /// In single precision: a solution waits for the factors to be read.
   Eigen::VectorXd solve_nearly(const Eigen::Ref<const Eigen::VectorXd> &right) const override
   {
     if (singles.empty()) singles.assign(numbers.begin(), numbers.end());

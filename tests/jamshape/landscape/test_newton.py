@@ -88,7 +88,7 @@ def made_in_space(w1, n):
     ("w1", "n"), [pytest.param(1, 600, id="spheres"), pytest.param(0.6, 170, id="spheroids")]
 )
 def test_complete_factors_in_space_solve_the_equations(w1, n, instructions, monkeypatch):
-    """Their supernodes differ in width, and none of them is a multiple of registers."""
+    """Their supernodes have many widths and heights, up to the widest."""
     monkeypatch.setenv("JAMSHAPE_SIMD", instructions)
     newton, curvature = equations(made_in_space(w1, n), 1e-3)
     right = right_sides(len(curvature.coupling))
