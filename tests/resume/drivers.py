@@ -231,7 +231,7 @@ CASES = DRIVERS | {
         {"gdot": 1e-3, "strain": 0.05, "flow": "pure", "integrator": "tr-bdf2", "integration_tolerance": 1e-2, "rows": 20},
     ),
     "implicit compression in space": Case(
-        "slow_compress", "bodies", {"phi": (None, 0.76), "kappa": 1e-4},
+        "slow_compress", "bodies", {"phi": (None, 0.8), "kappa": 1e-5, "integration_tolerance": 1e-5},
     ),
     "implicit shear in space": Case(
         "shear", "bodies",
@@ -249,7 +249,7 @@ CASES = DRIVERS | {
         "quasistatic_shear", "dimers", {"step": 4e-3, "strain": 0.04, "pressure": 1e-3, "box": "yy", "frames": 3},
     ),
     "quasistatic shear by the stress": Case(
-        "quasistatic_shear", "dimers", {"stress_step": 6e-4, "strain": 0.05, "frames": 3},
+        "quasistatic_shear", "dimers", {"stress_step": 6e-4, "strain": 0.08, "frames": 3},
         {"stress_step": 7e-4},
     ),
     "ladder in pressure": Case(
