@@ -114,10 +114,12 @@ nb::object move(LocalEnergyModel &of, const Array1<double> &x, double strain)
   return poses_of(of);
 }
 
-nb::object solve(const Factors &factors, const Array2<double> &right)
+nb::object solve(const Factors &factors, const Array2<double> &right, bool nearly)
 {
   require(right.shape(1) == factors.size(), "right does not have the length of the matrix.");
-  return solutions(right, [&](const auto &side) { return factors.solve(side); });
+  return solutions(right, [&](const auto &side) {
+    return nearly ? factors.solve_nearly(side) : factors.solve(side);
+  });
 }
 
 /// Kept as a separate function: compilers limit inlining by the size of a function.
@@ -175,7 +177,8 @@ void export_local_energy_model(nb::module_ &m)
 {
   using namespace nb::literals;
   nb::class_<Factors>(m, "Factors", "Factors of a positive definite matrix.")
-      .def("solve", &solve, "right"_a, "Solve for each row of right (k, n).");
+      .def("solve", &solve, "right"_a, nb::kw_only(), "nearly"_a = false,
+           "Solve for each row of right (k, n), or nearly, as to precondition iterations.");
   m.attr("LEAST_SHIFT") = LEAST_SHIFT;
 
   nb::class_<LocalEnergyModel>(m, "LocalEnergyModel", "The energy of a packing about a base.")

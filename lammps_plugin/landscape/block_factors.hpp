@@ -77,9 +77,9 @@ struct BlockPattern {
   /// The number of those of a particle.
   int count(std::size_t i) const { return static_cast<int>(coordinate[i + 1] - coordinate[i]); }
 
-  /// The number of solutions that take as long as new factors, of blocks with this many rows. A
-  /// solution, which waits for memory, takes as long for one of them as this number of their
-  /// columns in products of two.
+  /// The number of solutions that take as long as new factors, with blocks of this many columns. A
+  /// solution waits for blocks to be read; a product of two blocks takes that time for this number
+  /// of columns.
   double price(int block) const
   {
     constexpr double COLUMNS_PER_SOLUTION = 15.0;
@@ -204,17 +204,25 @@ template <int BLOCK> struct BlockMatrix {
 /// diagonal.
 template <int BLOCK> class Elimination : public Factors {
  public:
+  explicit Elimination(std::shared_ptr<const BlockPattern> of) : pattern(std::move(of)) {}
+
   /// Factors of a matrix plus a diagonal, its rows in the order of elimination. False, and no
   /// factors, if a pivot is not positive: then the matrix is not positive definite (Sylvester's law
   /// of inertia), if the fill is complete.
   virtual bool factorise(const BlockMatrix<BLOCK> &matrix, const BlockRows<BLOCK> &added) = 0;
+
+  std::size_t size() const override { return pattern->n(); }
+  double price() const override { return pattern->price(BLOCK); }
+
+ protected:
+  std::shared_ptr<const BlockPattern> pattern;
 };
 
 /// Factors block by block: three times faster than element by element.
 template <int BLOCK> class BlockFactors : public Elimination<BLOCK> {
  public:
   BlockFactors(std::shared_ptr<const BlockPattern> of, const BlockKernels &compiled) :
-      pattern(std::move(of)), kernels(compiled), diagonal(pattern->size()),
+      Elimination<BLOCK>(std::move(of)), kernels(compiled), diagonal(pattern->size()),
       below(pattern->row.size()), inverse_pivots(BLOCK * pattern->size()),
       block_of_row(pattern->size()), column_of_row(pattern->size())
   {
@@ -226,9 +234,6 @@ template <int BLOCK> class BlockFactors : public Elimination<BLOCK> {
     return kernels.factorise(matrix.view(*pattern), view());
   }
 
-  std::size_t size() const override { return pattern->n(); }
-  double price() const override { return pattern->price(BLOCK); }
-
   Eigen::VectorXd solve(const Eigen::Ref<const Eigen::VectorXd> &right) const override
   {
     BlockRows<BLOCK> x(*pattern, right);
@@ -237,7 +242,7 @@ template <int BLOCK> class BlockFactors : public Elimination<BLOCK> {
   }
 
  private:
-  std::shared_ptr<const BlockPattern> pattern;
+  using Elimination<BLOCK>::pattern;
   BlockKernels kernels;
   // L below the pivots, which its diagonal holds.
   mutable std::vector<BlockOf<BLOCK>> diagonal, below;

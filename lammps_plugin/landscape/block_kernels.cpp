@@ -369,6 +369,7 @@ constexpr int AT_ONCE = 4;
 #endif
 constexpr int SUMS = 16;
 using Several = double __attribute__((vector_size(8 * AT_ONCE)));
+
 double add_and_dot(int n, double by, const float *vector, const float *further, double *x)
 {
   Several sum[SUMS / AT_ONCE]{};  // in turns, since each addition waits for the one before

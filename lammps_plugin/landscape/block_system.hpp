@@ -55,7 +55,7 @@ struct BlockPlan {
 template <int BLOCK> class IteratedFactors : public Factors {
  public:
   IteratedFactors(std::shared_ptr<const BlockPattern> of, const BlockKernels &compiled,
-                  BlockMatrix<BLOCK> of_equations, std::shared_ptr<Elimination<BLOCK>> nearly) :
+                  BlockMatrix<BLOCK> of_equations, std::shared_ptr<const Factors> nearly) :
       pattern(std::move(of)), kernels(compiled), matrix(std::move(of_equations)),
       near(std::move(nearly))
   {
@@ -86,7 +86,7 @@ template <int BLOCK> class IteratedFactors : public Factors {
   std::shared_ptr<const BlockPattern> pattern;
   BlockKernels kernels;
   BlockMatrix<BLOCK> matrix;
-  std::shared_ptr<Elimination<BLOCK>> near;
+  std::shared_ptr<const Factors> near;
 };
 
 /// Block system of particles with only their first BLOCK coordinates.

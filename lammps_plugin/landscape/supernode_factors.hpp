@@ -84,11 +84,8 @@ template <int BLOCK> class SupernodeFactors : public Elimination<BLOCK> {
  public:
   SupernodeFactors(std::shared_ptr<const BlockPattern> of,
                    std::shared_ptr<const SupernodePattern> supernodes) :
-      pattern(std::move(of)), super(std::move(supernodes)),
-      numbers(super->start.back() + SUPERNODE_ROOM), inverse_pivots(BLOCK * pattern->size()),
-      head(super->size()), next(super->size()), position(super->size()), local(pattern->size()),
-      to(super->highest), by(static_cast<std::size_t>(super->widest) * (super->widest + ROUNDED)),
-      part(super->highest)
+      Elimination<BLOCK>(std::move(of)), super(std::move(supernodes)),
+      numbers(super->start.back() + SUPERNODE_ROOM), inverse_pivots(BLOCK * pattern->size())
   {
   }
 
@@ -98,13 +95,13 @@ template <int BLOCK> class SupernodeFactors : public Elimination<BLOCK> {
     BlockView shifted = matrix.view(*pattern);
     shifted.diagonal = numbers_of<BLOCK>(diagonal);
     singles.clear();
+    std::vector<int> head(super->size()), next(super->size()), position(super->size());
+    std::vector<int> local(pattern->size()), to(super->highest);
+    std::vector<double> by(static_cast<std::size_t>(super->widest) * (super->widest + ROUNDED));
     return kernels.factorise(
         shifted, view(),
         {head.data(), next.data(), position.data(), local.data(), to.data(), by.data()});
   }
-
-  std::size_t size() const override { return pattern->n(); }
-  double price() const override { return pattern->price(BLOCK); }
 
   Eigen::VectorXd solve(const Eigen::Ref<const Eigen::VectorXd> &right) const override
   {
@@ -124,18 +121,17 @@ template <int BLOCK> class SupernodeFactors : public Elimination<BLOCK> {
   /// Room for the last group of rows of a product.
   static constexpr int ROUNDED = 8;
 
-  std::shared_ptr<const BlockPattern> pattern;
+  using Elimination<BLOCK>::pattern;
   std::shared_ptr<const SupernodePattern> super;
   SupernodeKernels kernels = supernode_kernels<BLOCK>();
   mutable std::vector<double> numbers, inverse_pivots;
-  std::vector<int> head, next, position, local, to;  // work space
-  mutable std::vector<double> by, part;
-  mutable std::vector<float> singles;
+  mutable std::vector<float> singles;  // once they are needed
 
   Eigen::VectorXd solved(const Eigen::Ref<const Eigen::VectorXd> &right,
                          const SupernodeView &with) const
   {
     BlockRows<BLOCK, BLOCK> x(*pattern, right);
+    std::vector<double> part(super->highest);
     kernels.solve(with, x.data(), part.data());
     return x.gathered();
   }

@@ -184,7 +184,7 @@ def of_vicinity(fuzz, of, dimension, poses):
         )
         if found is not None:
             held["factors"] = found
-            fuzz.call("Factors.solve", found.solve, right=np.ones((1, n)))
+            fuzz.call("Factors.solve", found.solve, right=np.ones((1, n)), nearly=True)
 
     def newton():
         system = fuzz.call("NewtonSystem", _contact.NewtonSystem, local_model=about, shift=1.0)

@@ -96,6 +96,19 @@ def test_complete_factors_in_space_solve_the_equations(w1, n, instructions, monk
     assert remainders(newton, curvature.hessian, right, found).max() < 1e-11
 
 
+def test_near_solutions_are_those_of_the_last_factors_in_single_precision():
+    packing = made_in_space(1, 120)  # few enough for complete factors
+    landscape, state = Landscape(packing), State.of(packing)
+    model = LocalEnergyModel(landscape, state)
+    still, right = np.zeros(landscape.size), right_sides(landscape.size)
+    for stiff in (1.0, 0.1):  # the memory of factors that nothing holds is used again
+        factors = model.factorise(still, 0.0, np.full(landscape.size, stiff)).compiled
+        exact, near = factors.solve(right), factors.solve(right, nearly=True)
+        error = np.linalg.norm(near - exact) / np.linalg.norm(exact)
+        assert 1e-10 < error < 1e-5
+        del factors
+
+
 @pytest.mark.parametrize("name", [*PRESSED, MANY])
 def test_coupling_is_that_of_the_landscape(name):
     newton, curvature = equations(packing_named(name), 1e-9)
