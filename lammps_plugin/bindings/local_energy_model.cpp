@@ -177,7 +177,7 @@ void export_local_energy_model(nb::module_ &m)
 {
   using namespace nb::literals;
   nb::class_<Factors>(m, "Factors", "Factors of a positive definite matrix.")
-      .def("solve", &solve, "right"_a, nb::kw_only(), "nearly"_a = false,
+      .def("solve", &solve, "right"_a, "nearly"_a = false,
            "Solve for each row of right (k, n), or nearly, as to precondition iterations.");
   m.attr("LEAST_SHIFT") = LEAST_SHIFT;
 
