@@ -3,7 +3,6 @@
 #include "landscape/block_kernels.hpp"
 
 #include "landscape/dense_square.hpp"
-#include "landscape/single_precision.hpp"
 
 #include <cstring>
 
@@ -360,45 +359,7 @@ template <int BLOCK> void multiply(const BlockView &at, const double *x, double 
   }
 }
 
-/// Numbers added at once: 16 sums in any case, so that the rounding does not depend on the
-/// instruction set.
-#if defined(__AVX512F__)
-constexpr int AT_ONCE = 8;
-#else
-constexpr int AT_ONCE = 4;
-#endif
-constexpr int SUMS = 16;
-using Several = double __attribute__((vector_size(8 * AT_ONCE)));
-
-double add_and_dot(int n, double by, const float *vector, const float *further, double *x)
-{
-  Several sum[SUMS / AT_ONCE]{};  // in turns, since each addition waits for the one before
-  int k = 0;
-  for (; k + SUMS <= n; k += SUMS) {
-    for (int m = 0; m < SUMS / AT_ONCE; ++m) {
-      const int at = k + AT_ONCE * m;
-      Several own;
-      std::memcpy(&own, x + at, sizeof(own));
-      own += by * in_doubles<Several>(vector + at);
-      std::memcpy(x + at, &own, sizeof(own));
-      sum[m] += own * in_doubles<Several>(further + at);
-    }
-  }
-  double rest = 0.0;
-  for (; k < n; ++k) {
-    x[k] += by * vector[k];
-    rest += x[k] * further[k];
-  }
-  double each[SUMS], all[4];
-  std::memcpy(each, sum, sizeof(each));
-  for (int m = 0; m < 4; ++m) all[m] = (each[m] + each[m + 4]) + (each[m + 8] + each[m + 12]);
-  return ((all[0] + all[1]) + (all[2] + all[3])) + rest;
-}
-
 }  // namespace
-
-template <InstructionSet SET> AddAndDot add_and_dot_of() { return &add_and_dot; }
-template AddAndDot add_and_dot_of<InstructionSet::JAMSHAPE_SET>();
 
 template <InstructionSet SET, int BLOCK> BlockKernels block_kernels_of()
 {

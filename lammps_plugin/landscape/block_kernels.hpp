@@ -42,12 +42,6 @@ struct BlockKernels {
   void (*multiply)(const BlockView &matrix, const double *x, double *y);
 };
 
-/// Kernels of the method L-BFGS: adds `by` times a vector (n,) to x, and returns the dot product of
-/// x and a further one. Single precision halves the time, which is that of reading them.
-using AddAndDot = double (*)(int n, double by, const float *vector, const float *further,
-                             double *x);
-template <InstructionSet SET> AddAndDot add_and_dot_of();
-
 /// Compiled in block_kernels.cpp for each instruction set.
 template <InstructionSet SET, int BLOCK> BlockKernels block_kernels_of();
 
@@ -61,11 +55,6 @@ template <class OfSet> auto best_compiled(const OfSet &of_set)
 template <int BLOCK> BlockKernels block_kernels()
 {
   return best_compiled([](auto one) { return &block_kernels_of<decltype(one)::value, BLOCK>; });
-}
-
-inline AddAndDot add_and_dot()
-{
-  return best_compiled([](auto one) { return &add_and_dot_of<decltype(one)::value>; });
 }
 
 }  // namespace jamshape

@@ -214,6 +214,7 @@ template <class Model, int D> class MovedPairs : public BodyPairs<Model, D, doub
   {
     const auto &[value, rest] = apart[p];
     const Vec<D> small = rest + (shift[first(p)] - shift[second(p)]);
+    if (strain == 0.0) return value + small;
     return value + (small + strain * (value + small));  // one rounding of the size of r
   }
 

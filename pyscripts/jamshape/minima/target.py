@@ -47,9 +47,12 @@ _FALLEN = 1e-2
 # Likewise for this fraction of the energy that a compression step adds to a jammed packing.
 _UNJAMMED = 1e-3
 
-# A packing whose energy falls below this fraction of the expected one slides. It is compressed back to that energy, at most
-# this many times: at a fixed box the forces that drive the slide would fade, and with them its speed.
-_SLID, _MOST_PARTS = 0.7, 100
+# A packing slides whose energy falls below this fraction of the expected one, or which takes more evaluations than this, or
+# than these for each particle. It is compressed, at most this many times: at a fixed box the forces that drive the slide
+# would fade, and with them its speed. Each time the root of u that is linear in the strain grows by this factor, up to that
+# at which the step began, where packings take fewer evaluations.
+_SLID, _MOST_PARTS, _DRIVEN = 0.7, 100, 2.0
+_LONG, _LONG_FOR_EACH = 10_000, 2
 
 # Relative accuracy of the predicted displacements as the box is strained.
 _PREDICTION = 1e-3
@@ -338,8 +341,7 @@ class Leading:
     """A minimum on its way to u0, between two minimisations, with all that is needed to resume it.
 
     The box is strained to where the root of u that is linear in the strain reaches that of u0. Where that opens the
-    packing, fractions of the strain are tried. One that slides before it is near u0 is compressed meanwhile, at about equal
-    energy. A minimum that stalls at u0, where a contact is about to open or close, is approached again from a higher energy.
+    packing, fractions of the strain are tried. One that slides is compressed, to ever higher energies, until it is at rest. A minimum that stalls at u0, where a contact is about to open or close, is approached again from a higher energy.
 
     Parameters
     ----------
@@ -358,7 +360,7 @@ class Leading:
     tolerance, aim
         Residual and energy density to reach.
     unfinished, root, parts
-        State of a packing that slides, if it does; the root of u expected, and how often it was minimised there.
+        State of a packing that slides, if it does; the root of u expected, and how often it was minimised on this step.
     n_minima
         Minimisations of this approach.
     least, stalls
@@ -387,7 +389,8 @@ class Leading:
         u = self.root**landscape.law.power
         found = _relaxed(landscape, begun, replace(target, tolerance=self.tolerance), u, method)
         self.parts += 1
-        if found.outcome is Outcome.UNJAMMED:
+        is_long = found.outcome is Outcome.EXHAUSTED and self.parts < _MOST_PARTS
+        if found.outcome is Outcome.UNJAMMED or is_long:
             return self._compressed_or_lost(landscape, found, u)
         self.unfinished, self.jammed = None, found
         if self.is_new:
@@ -402,6 +405,8 @@ class Leading:
     def _begun(self, landscape: Landscape, target: Target) -> tuple[Minimum, str]:
         """Return the state to minimise next, and the method."""
         if self.unfinished is not None:
+            highest = landscape.law.root(self.jammed.energy_density)
+            self.root = max(self.root, min(_DRIVEN * self.root, highest))
             strain = _strain_to(landscape, self.unfinished, self.root)
             return replace(self.unfinished, state=self.unfinished.state.strained(strain)), "auto"
         self.parts = 0
@@ -468,7 +473,8 @@ def _relaxed(landscape: Landscape, at: Minimum, target: Target, u: float, method
     near = abs(landscape.law.root(u / target.u0) - 1) < _NEAR
     tolerance = target.tolerance if near else max(target.tolerance, _GOOD_TO_MOVE)
     lowest = fraction_of_energy(landscape, _FALLEN if near else _SLID) * u
-    stop = Stop(tolerance, lowest=lowest, kinks=near)
+    most = max(_LONG, _LONG_FOR_EACH * landscape.particles.n)
+    stop = Stop(tolerance, lowest=lowest, evaluations=most, kinks=near)
     return minimise(landscape, at.state, method, stop, at.history)
 
 

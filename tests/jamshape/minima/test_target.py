@@ -236,6 +236,28 @@ def test_a_packing_that_slides_is_compressed_to_the_energy_it_should_have(slides
     pytest.fail("nothing slid")
 
 
+def test_a_packing_that_takes_long_is_compressed_to_higher_energies(monkeypatch):
+    """Each time to twice the root of u, up to that where the step began; it arrives at u0 in the end."""
+    monkeypatch.setattr(target_of, "_LONG", 40)
+    monkeypatch.setattr(target_of, "_LONG_FOR_EACH", 0)
+    landscape, state = long_rods()
+    roots = []
+    for search in extrapolation(landscape, Search(state, 5e-4), Target(1e-12)):
+        leading = search.leading
+        if leading is None or leading.unfinished is None:
+            continue
+        assert leading.unfinished.outcome is Outcome.EXHAUSTED
+        highest = leading.jammed.energy_density**0.5
+        before = leading.root
+        again = copied(search).leading
+        again.advance(landscape, Target(1e-12))
+        assert again.root == pytest.approx(max(before, min(2 * before, highest)), rel=1e-12)
+        roots.append(again.root / before)
+    assert max(roots) == pytest.approx(2)
+    assert search.minimum.energy_density == pytest.approx(1e-12, rel=1e-7, abs=0)
+    assert search.minimum.residual.largest <= 1e-8
+
+
 def test_search_yields_after_every_minimisation_and_has_its_minimum_in_the_end_only():
     landscape, state = start_of("16 discs")
     minima, rows = [], []

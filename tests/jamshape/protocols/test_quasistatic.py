@@ -104,7 +104,7 @@ ADAPTIVE = Quasistatic(step=2e-3, energy=1e-8, coarse=4e-2)
 @pytest.fixture(scope="module")
 def adaptive():
     """List the step before, the evaluations and the step after each minimisation that left the packing unjammed."""
-    landscape, compression, protocol = begun(n=32, phi=0.32, protocol=ADAPTIVE)
+    landscape, compression, protocol = begun(n=32, phi=0.33, protocol=ADAPTIVE)
     rows, loose = [], compression.loose
     step, evaluations, reached = compression.step, landscape.evaluations, []
     for at in compress(landscape, compression, protocol):
@@ -178,7 +178,7 @@ def test_before_a_search_long_minimisations_are_left_once_in_a_row(monkeypatch):
     monkeypatch.setattr(quasistatic, "_PART", 60)
     monkeypatch.setattr(quasistatic, "_BRIEF", 60)
     rough = replace(ADAPTIVE, closeness=math.inf)
-    landscape, compression, protocol = begun(n=24, phi=0.5, protocol=rough)
+    landscape, compression, protocol = begun(n=28, phi=0.5, protocol=rough)
     left, loose = [], compression.loose
     for at in compress(landscape, compression, protocol):
         if at.loose is loose:  # a part of a minimisation
@@ -187,7 +187,7 @@ def test_before_a_search_long_minimisations_are_left_once_in_a_row(monkeypatch):
         left.append(at.left)
         if at.left:  # what a step of compression adds to a jammed packing would be as much
             assert at.parts == 0
-            per_particle = landscape.evaluate(at.loose).energy / 24
+            per_particle = landscape.evaluate(at.loose).energy / 28
             assert 1 < per_particle / protocol.energy <= quasistatic._LITTLE
             assert at.phi == pytest.approx(at.loose_phi + at.step, rel=1e-12)
     assert any(left)
@@ -195,7 +195,7 @@ def test_before_a_search_long_minimisations_are_left_once_in_a_row(monkeypatch):
     assert compression.minimum is not None
     assert compression.minimum.is_at_rest
     # As close to the tolerance as asked for, every one is finished.
-    landscape, compression, protocol = begun(n=24, phi=0.5, protocol=ADAPTIVE)
+    landscape, compression, protocol = begun(n=28, phi=0.5, protocol=ADAPTIVE)
     assert not any(at.left for at in compress(landscape, compression, protocol))
 
 

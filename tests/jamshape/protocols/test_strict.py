@@ -86,7 +86,7 @@ def test_steps_end_at_walls():
 @pytest.fixture(scope="module")
 def strict(tmp_path_factory):
     out = tmp_path_factory.mktemp("strict") / "packing.h5"
-    recipe = recipe_for(bidisperse(4.0), n=16, seed=8, strict=True)
+    recipe = recipe_for(bidisperse(4.0), n=16, seed=17, strict=True)
     make(recipe, out)
     return out, recipe
 
@@ -146,9 +146,9 @@ def energies_beside(landscape, minimum, size):
     return np.array(energies) / landscape.evaluate(minimum).energy
 
 
-# 430 and 1399 end on a kink, too, one side of which rises in second order only.
+# 288 ends on a kink, too, one side of which rises in second order only.
 @chosen_by_seed
-@pytest.mark.parametrize("seed", [678, pytest.param(1489, marks=pytest.mark.validate)])
+@pytest.mark.parametrize("seed", [124, pytest.param(568, marks=pytest.mark.validate)])
 def test_minimum_on_a_kink_is_proven_by_its_two_sides(seed, tmp_path):
     """The tips of two rods are level: a bond passes from one to the other."""
     out = tmp_path / "packing.h5"
