@@ -103,7 +103,7 @@ def test_a_box_with_the_least_tilt_is_the_same_packing():
 
 def test_spheroids_in_space_shear(measured):
     bodies = js.Superellipsoids(w1=0.6)
-    start = random_packing(8, 0.2, 1, bodies, 3)
+    start = random_packing(8, 0.2, 2, bodies, 3)
     landscape = Landscape(start)
     state = compressed_to(landscape, State.of(start), 0.8, 0.02)
     rows = list(shear(landscape, Sheared(state), QuasistaticShear(2e-3, 0.04)))

@@ -19,10 +19,10 @@ KINDS = {"discs": (js.Spherocylinders(alpha=0), 2), "spheres": (js.Superellipsoi
 
 
 @cache
-def packing(name="discs"):
+def packing(name="discs", seed=1):
     """A packing without shear stress."""
     particles, dimension = KINDS[name]
-    given = {"n": 24, "dimension": dimension, "pressure": PRESSURE, "box": "free"}
+    given = {"n": 24, "seed": seed, "dimension": dimension, "pressure": PRESSURE, "box": "free"}
     return js.make_packing(particles, progress=False, **given)
 
 
@@ -56,8 +56,9 @@ def test_small_steps_lose_no_energy(box):
 
 @pytest.mark.parametrize("box", ["isotropic", "yy", "xx yy"])
 def test_work_of_cycles_at_a_pressure_is_stored_or_lost(box, tmp_path, measured):
+    """Of a packing whose volume does not jump by a percent: means of two rows are not the work of that."""
     run = js.quasistatic_shear(
-        start=packing(), pressure=PRESSURE, box=box, step=2e-3, amplitude=0.04, cycles=1, progress=False,
+        start=packing(seed=2), pressure=PRESSURE, box=box, step=2e-3, amplitude=0.04, cycles=1, progress=False,
         file=tmp_path / "run.h5",
     )  # fmt: skip
     energy, per_cycle = run["u"] / run.phi * run.phi[0], run.steps_per_cycle
