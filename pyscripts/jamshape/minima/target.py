@@ -48,7 +48,7 @@ _FALLEN = 1e-2
 _UNJAMMED = 1e-3
 
 # A packing slides whose energy falls below this fraction of the expected one, or which takes more evaluations than this, or
-# than these for each particle. It is compressed, at most this many times: at a fixed box the forces that drive the slide
+# than these for each particle, or which stalls, of round particles, whose energy has no kinks, far from rest. It is compressed, at most this many times: at a fixed box the forces that drive the slide
 # would fade, and with them its speed. Each time the root of u that is linear in the strain grows by this factor, up to that
 # at which the step began, where packings take fewer evaluations.
 _SLID, _MOST_PARTS, _DRIVEN = 0.7, 100, 2.0
@@ -389,8 +389,7 @@ class Leading:
         u = self.root**landscape.law.power
         found = _relaxed(landscape, begun, replace(target, tolerance=self.tolerance), u, method)
         self.parts += 1
-        is_long = found.outcome is Outcome.EXHAUSTED and self.parts < _MOST_PARTS
-        if found.outcome is Outcome.UNJAMMED or is_long:
+        if found.outcome is Outcome.UNJAMMED or self._slides_on(landscape, found):
             return self._compressed_or_lost(landscape, found, u)
         self.unfinished, self.jammed = None, found
         if self.is_new:
@@ -401,6 +400,15 @@ class Leading:
             self.n_minima += 1
             self.part = min(2 * self.part, 1.0)
         return self._end(landscape, target) if self._is_there(target) else None
+
+    def _slides_on(self, landscape: Landscape, found: Minimum) -> bool:
+        """Whether a jammed packing is far from rest, on no kink, and may still be compressed."""
+        if found.outcome is Outcome.EXHAUSTED:
+            return self.parts < _MOST_PARTS
+        if found.outcome is not Outcome.STALLED or found.residual.largest <= _GOOD:
+            return False
+        highest = landscape.law.root(self.jammed.energy_density)
+        return bool(landscape.particles.is_round.all()) and self.root < highest
 
     def _begun(self, landscape: Landscape, target: Target) -> tuple[Minimum, str]:
         """Return the state to minimise next, and the method."""

@@ -1,5 +1,6 @@
 import math
 from copy import deepcopy
+from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
 
@@ -256,6 +257,27 @@ def test_a_packing_that_takes_long_is_compressed_to_higher_energies(monkeypatch)
     assert max(roots) == pytest.approx(2)
     assert search.minimum.energy_density == pytest.approx(1e-12, rel=1e-7, abs=0)
     assert search.minimum.residual.largest <= 1e-8
+
+
+@pytest.mark.parametrize(("start", "is_driven"), [("16 discs", True), ("16 rods", False)])
+def test_round_particles_that_stall_far_from_rest_are_compressed(start, is_driven, monkeypatch):
+    """Others may have stalled on a kink."""
+    landscape, state = start_of(start)
+    jammed = find(landscape, state, Target(1e-6))
+    leading = Leading(jammed, jammed, is_new=False, aim=1e-12, tolerance=1e-8)
+
+    def stalled(landscape, start, method, stop, *more):
+        found = minimise(landscape, start, method, stop, *more)
+        return replace(found, outcome=Outcome.STALLED, residual=found.residual._replace(force=0.1))
+
+    monkeypatch.setattr(target_of, "minimise", stalled)
+    leading.advance(landscape, Target(1e-12))
+    root = leading.root
+    assert root < 0.5e-3
+    assert (leading.unfinished is not None) == is_driven
+    if is_driven:
+        leading.advance(landscape, Target(1e-12))
+        assert leading.root == pytest.approx(2 * root)
 
 
 def test_search_yields_after_every_minimisation_and_has_its_minimum_in_the_end_only():
