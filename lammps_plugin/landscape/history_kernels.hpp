@@ -6,7 +6,7 @@
 
 namespace jamshape {
 
-/// The first half of a number in single precision, the format bfloat16: three digits.
+/// The first half of a number in single precision, the format bfloat16: eight bits.
 using FirstHalf = std::uint16_t;
 
 /// Kernels of the method L-BFGS, whose time is that of reading the steps that it remembers. All
