@@ -13,36 +13,30 @@ namespace {
 
 constexpr int AT_ONCE = HistoryKernels::AT_ONCE;
 
-// A register of numbers, from their first halves: in two instructions, where gcc makes several of
-// __builtin_convertvector.
 #if defined(__AVX512F__)
 constexpr int LANES = 16;
-using Floats = float __attribute__((vector_size(64)));
-Floats in_single_precision(const FirstHalf *from)
-{
-  const __m256i halves = _mm256_loadu_si256(reinterpret_cast<const __m256i_u *>(from));
-  return _mm512_castsi512_ps(_mm512_slli_epi32(_mm512_cvtepu16_epi32(halves), 16));
-}
 #elif defined(__AVX2__)
 constexpr int LANES = 8;
-using Floats = float __attribute__((vector_size(32)));
-Floats in_single_precision(const FirstHalf *from)
-{
-  const __m128i halves = _mm_loadu_si128(reinterpret_cast<const __m128i_u *>(from));
-  return _mm256_castsi256_ps(_mm256_slli_epi32(_mm256_cvtepu16_epi32(halves), 16));
-}
 #else
 constexpr int LANES = 4;
-using Floats = float __attribute__((vector_size(16)));
+#endif
+using Floats = float __attribute__((vector_size(4 * LANES)));
+using Bits = std::uint32_t __attribute__((vector_size(4 * LANES)));
+
+/// A register of numbers: halves are widened by one instruction, where gcc makes several of
+/// __builtin_convertvector.
 Floats in_single_precision(const FirstHalf *from)
 {
-  std::uint32_t whole[LANES];
-  for (int k = 0; k < LANES; ++k) whole[k] = std::uint32_t{from[k]} << 16;
-  Floats found;
-  std::memcpy(&found, whole, sizeof(found));
-  return found;
-}
+  Bits bits;
+#if defined(__AVX512F__)
+  bits = Bits(_mm512_cvtepu16_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i_u *>(from))));
+#elif defined(__AVX2__)
+  bits = Bits(_mm256_cvtepu16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i_u *>(from))));
+#else
+  for (int k = 0; k < LANES; ++k) bits[k] = from[k];
 #endif
+  return Floats(bits << 16);
+}
 
 void shorten(int n, double by, const double *vector, FirstHalf *to)
 {

@@ -21,8 +21,6 @@ class QuasiNewton {
   /// Directions that remember this many steps.
   explicit QuasiNewton(std::size_t most_steps) : most(most_steps) {}
 
-  bool is_empty() const { return pairs.empty(); }
-
   /// Adds a step and the change of the gradient along it, both over the length of the step.
   void learn(const Vector &step, const Vector &change)
   {

@@ -47,10 +47,10 @@ _FALLEN = 1e-2
 # Likewise for this fraction of the energy that a compression step adds to a jammed packing.
 _UNJAMMED = 1e-3
 
-# A packing slides whose energy falls below this fraction of the expected one, or which takes more evaluations than this, or
-# than these for each particle, or which stalls, of round particles, whose energy has no kinks, far from rest. It is compressed, at most this many times: at a fixed box the forces that drive the slide
-# would fade, and with them its speed. Each time the root of u that is linear in the strain grows by this factor, up to that
-# at which the step began, where packings take fewer evaluations.
+# A packing slides whose energy falls below this fraction of the expected one, which takes more evaluations than this and than
+# these for each particle, or, of round particles, whose energy has no kinks, which stalls far from rest. It is compressed, at
+# most this many times: at a fixed box the forces that drive the slide would fade, and with them its speed. Each time the root
+# of u that is linear in the strain grows by this factor, up to that at which the step began: there it takes fewer evaluations.
 _SLID, _MOST_PARTS, _DRIVEN = 0.7, 100, 2.0
 _LONG, _LONG_FOR_EACH = 10_000, 2
 
@@ -341,7 +341,8 @@ class Leading:
     """A minimum on its way to u0, between two minimisations, with all that is needed to resume it.
 
     The box is strained to where the root of u that is linear in the strain reaches that of u0. Where that opens the
-    packing, fractions of the strain are tried. One that slides is compressed, to ever higher energies, until it is at rest. A minimum that stalls at u0, where a contact is about to open or close, is approached again from a higher energy.
+    packing, fractions of the strain are tried. One that slides is compressed, to ever higher energies, until it is at rest. A
+    minimum that stalls at u0, where a contact is about to open or close, is approached again from a higher energy.
 
     Parameters
     ----------
@@ -389,7 +390,7 @@ class Leading:
         u = self.root**landscape.law.power
         found = _relaxed(landscape, begun, replace(target, tolerance=self.tolerance), u, method)
         self.parts += 1
-        if found.outcome is Outcome.UNJAMMED or self._slides_on(landscape, found):
+        if found.outcome is Outcome.UNJAMMED or self._slides(landscape, found):
             return self._compressed_or_lost(landscape, found, u)
         self.unfinished, self.jammed = None, found
         if self.is_new:
@@ -401,20 +402,25 @@ class Leading:
             self.part = min(2 * self.part, 1.0)
         return self._end(landscape, target) if self._is_there(target) else None
 
-    def _slides_on(self, landscape: Landscape, found: Minimum) -> bool:
-        """Whether a jammed packing is far from rest, on no kink, and may still be compressed."""
-        if found.outcome is Outcome.EXHAUSTED:
-            return self.parts < _MOST_PARTS
-        if found.outcome is not Outcome.STALLED or found.residual.largest <= _GOOD:
+    def _slides(self, landscape: Landscape, found: Minimum) -> bool:
+        """Whether a jammed packing takes long or stalls far from rest, on no kink, and may be compressed."""
+        if self.parts == _MOST_PARTS:
             return False
-        highest = landscape.law.root(self.jammed.energy_density)
-        return bool(landscape.particles.is_round.all()) and self.root < highest
+        if found.outcome is not Outcome.STALLED:
+            return found.outcome is Outcome.EXHAUSTED
+        has_kinks = not landscape.particles.is_round.all()
+        is_driven = self._driven(landscape) > self.root
+        return is_driven and not has_kinks and found.residual.largest > _GOOD
+
+    def _driven(self, landscape: Landscape) -> float:
+        """Return the root of u to which a packing that slides is compressed next."""
+        highest: float = landscape.law.root(self.jammed.energy_density)
+        return max(self.root, min(_DRIVEN * self.root, highest))
 
     def _begun(self, landscape: Landscape, target: Target) -> tuple[Minimum, str]:
         """Return the state to minimise next, and the method."""
         if self.unfinished is not None:
-            highest = landscape.law.root(self.jammed.energy_density)
-            self.root = max(self.root, min(_DRIVEN * self.root, highest))
+            self.root = self._driven(landscape)
             strain = _strain_to(landscape, self.unfinished, self.root)
             return replace(self.unfinished, state=self.unfinished.state.strained(strain)), "auto"
         self.parts = 0

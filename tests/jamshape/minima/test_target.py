@@ -225,7 +225,7 @@ def test_a_search_resumed_while_a_packing_slides_gives_the_same_bits():
     assert whole.residual.largest <= 1e-8
 
 
-def test_a_packing_that_slides_is_compressed_to_the_energy_it_should_have(slides):
+def test_a_packing_that_slides_is_compressed_to_the_energy_that_is_expected_next(slides):
     landscape, state = long_rods()
     for search in extrapolation(landscape, Search(state, 5e-4), Target(1e-12)):
         if search.leading is not None and search.leading.unfinished is not None:
