@@ -34,17 +34,17 @@ template <int D> struct ContactBlock {
 
   void add(int first, int second, const Vec<D> &r, double stiffness)
   {
-    put(first, second, r, stiffness);
+    put(first, second, r);
+    k_e[n] = stiffness;
     ++n;
   }
 
-  /// Writes what would be pair n, without counting it.
-  void put(int first, int second, const Vec<D> &r, double stiffness)
+  /// Writes what would be pair n except its k_e, without counting it.
+  void put(int first, int second, const Vec<D> &r)
   {
     i[n] = first;
     j[n] = second;
     for (int a = 0; a < D; ++a) separation[a][n] = r[a];
-    k_e[n] = stiffness;
   }
 
   /// Finds the contacts in packs of this many lanes: `lanes_of(block, first)` returns the

@@ -3,6 +3,7 @@
 #include "contact/math/rotation.hpp"
 #include "contact/math/vec.hpp"
 
+#include "landscape/near_kernels.hpp"
 #include "landscape/poses.hpp"
 
 #include <algorithm>
@@ -153,6 +154,7 @@ template <int D> class BasePoses {
   /// At most 1: the fraction of a step (n,) that keeps every particle within its bounds.
   double part_within(const double *step, const StepBounds &bounds) const
   {
+    if (!any_turns()) return 1.0 / std::max(1.0, longest(step) / bounds.longest);
     const Displacement by{step, 0.0};
     double farthest_sq = 0.0, excess = 1.0;
     for (std::size_t i = 0; i < n_particles(); ++i) {
@@ -170,21 +172,30 @@ template <int D> class BasePoses {
   /// (n,).
   double largest_part(const double *vector) const
   {
+    if (!any_turns()) return longest(vector);
     double most = 0.0;
     for (std::size_t i = 0; i < n_particles(); ++i) {
       const double *const own = vector + coordinates.first[i];
       double force = 0.0, torque = 0.0;
       for (int k = 0; k < D; ++k) force += own[k] * own[k];
       for (int k = D; k < coordinates.count(i); ++k) torque += own[k] * own[k];
-      most = std::max({most, force, torque});
+      most = std::max(most, std::max(force, torque));
     }
     return std::sqrt(most);
+  }
+
+  /// The length of the longest of vectors (N, D), or of their sums with others.
+  double longest(const double *vectors, const double *others = nullptr) const
+  {
+    return std::sqrt(kernels.longest_sq(n_particles(), vectors, others));
   }
 
  private:
   /// Largest rotation of nearly round particles in one step, if their surface stays within its
   /// bound.
   static constexpr double WIDE = 1.0;
+
+  NearKernels<D> kernels = near_kernels<D>();
 
   static double angle_of(const Vec<1> &turn) { return turn[0]; }
   static double angle_of(const Vec<3> &turn) { return norm(turn); }

@@ -5,6 +5,7 @@
 #include "contact/pair_derivatives.hpp"
 
 #include "landscape/coordinates.hpp"
+#include "landscape/near_kernels.hpp"
 #include "packing/pair_sum.hpp"
 #include "packing/split.hpp"
 
@@ -59,18 +60,16 @@ template <int D> struct NearPairs {
   /// Whether the gap of two surfaces may have shrunk by the skin, or by its remainder.
   bool is_beyond(const BasePoses<D> &near, const Displacement &at, double kept = 0.0) const
   {
-    double most = 0.0, most_sq = 0.0;
     const double stretch = 1.0 + at.strain;
-    for (std::size_t i = 0; i < near.n_particles(); ++i) {
-      const Vec<D> by = shift_to(near, at, i);
-      if (near.turns(i)) {
-        const double rotated = near.coordinates.turning_radius[i] * turned_to(near, at, i);
-        most = std::max(most, stretch * norm(by) + rotated);
-      } else {
-        most_sq = std::max(most_sq, norm_sq(by));
-      }
+    double most = 0.0;
+    if (!near.any_turns()) {
+      most = stretch * near.longest(at.x, moved.data());
     }
-    most = std::max(most, stretch * std::sqrt(most_sq));
+    for (std::size_t i = 0; near.any_turns() && i < near.n_particles(); ++i) {
+      const double rotated =
+          near.turns(i) ? near.coordinates.turning_radius[i] * turned_to(near, at, i) : 0.0;
+      most = std::max(most, stretch * norm(shift_to(near, at, i)) + rotated);
+    }
     return 2.0 * most >= skin - kept - box_strain(stretch) * reach;
   }
 
@@ -170,16 +169,17 @@ template <class Model, int D> class MovedPairs : public BodyPairs<Model, D, doub
              const Laws<typename Model::Law> &contact_laws,
              std::function<InLong(std::size_t)> exact_pair) :
       Base(particle_shapes, list.list(), contact_laws), exact(std::move(exact_pair)),
-      shift(particle_shapes.size()),
+      groups((this->size() + GROUP - 1) / GROUP), shift(particle_shapes.size()),
       orientation(particle_shapes.size(), Quaternion{1.0, 0.0, 0.0, 0.0})
   {
     const SplitPoses then = list.then.view(0.0);
     for (std::size_t p = 0; p < this->size(); ++p) {
       const double reach = this->around[first(p)] + this->around[second(p)];
-      reach_sq.push_back(reach * reach);
+      group_of(p).reach_sq[p % GROUP] = std::nextafter(static_cast<float>(reach * reach), INFINITY);
+      group_of(p).i[p % GROUP] = static_cast<int>(first(p));
+      group_of(p).j[p % GROUP] = static_cast<int>(second(p));
       before.push_back(separation_of<D, long double>(then, this->pairs, p));
     }
-    apart.resize(before.size());
     strain_by(std::vector<double>(D * D));
   }
 
@@ -193,8 +193,8 @@ template <class Model, int D> class MovedPairs : public BodyPairs<Model, D, doub
         long double grown = before[p][k];
         for (int m = k; m < D; ++m) grown += strained_by[D * k + m] * before[p][m];
         const Split parts = split(grown);
-        apart[p].value[k] = parts.value;
-        apart[p].rest[k] = parts.rest;
+        group_of(p).apart[k][p % GROUP] = parts.value;
+        group_of(p).rest[k][p % GROUP] = static_cast<float>(parts.rest);
       }
     }
   }
@@ -203,7 +203,7 @@ template <class Model, int D> class MovedPairs : public BodyPairs<Model, D, doub
   double strain = 0.0;
 
   /// Displaces a particle, apart from the box's strain.
-  void displace(std::size_t n, const Vec<D> &by) { shift[n] = by; }
+  void displace(std::size_t n, const Vec<D> &by) { std::copy_n(by.c, D, shift[n]); }
   void turn(std::size_t n, const Quaternion &to)
   {
     orientation[n] = to;
@@ -212,13 +212,22 @@ template <class Model, int D> class MovedPairs : public BodyPairs<Model, D, doub
 
   Vec<D> separation(std::size_t p) const
   {
-    const auto &[value, rest] = apart[p];
-    const Vec<D> small = rest + (shift[first(p)] - shift[second(p)]);
-    if (strain == 0.0) return value + small;
-    return value + (small + strain * (value + small));  // one rounding of the size of r
+    const PairGroup<D> &group = groups[p / GROUP];
+    Vec<D> r;
+    for (int k = 0; k < D; ++k) {
+      const double apart = group.apart[k][p % GROUP];
+      const double small = group.rest[k][p % GROUP] + (shift[first(p)][k] - shift[second(p)][k]);
+      r[k] = apart + (small + strain * (apart + small));  // one rounding of the size of r
+    }
+    return r;
   }
 
-  bool may_touch(std::size_t p, const Vec<D> &r) const { return norm_sq(r) < reach_sq[p]; }
+  /// Adds to a block those of a range of pairs that may touch, until it is full.
+  std::size_t fill(const Range &from, ContactBlock<D> &block, int *number) const
+  {
+    return kernels.touching({groups.data(), shift.data(), strain}, from.first, from.last, block,
+                            number);
+  }
 
   InLong pair_in_long(std::size_t p) const { return exact(p); }
 
@@ -228,16 +237,17 @@ template <class Model, int D> class MovedPairs : public BodyPairs<Model, D, doub
   }
 
  private:
+  static constexpr int GROUP = PairGroup<D>::SIZE;
+
   std::function<InLong(std::size_t)> exact;
-  struct Apart {
-    Vec<D> value, rest;
-  };
   std::vector<Vec<D, long double>> before;  // separations then
-  std::vector<Apart> apart;                 // the same with the box's strain
   std::vector<double> strained_by;
-  std::vector<double> reach_sq;  // squared distances at which bounding spheres touch
-  std::vector<Vec<D>> shift;
+  std::vector<PairGroup<D>> groups;
+  Vectors<D> shift;
   std::vector<Quaternion> orientation;
+  NearKernels<D> kernels = near_kernels<D>();
+
+  PairGroup<D> &group_of(std::size_t p) { return groups[p / GROUP]; }
 };
 
 }  // namespace jamshape

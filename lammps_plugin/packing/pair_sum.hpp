@@ -94,10 +94,9 @@ using StartIn =
     std::conditional_t<std::is_same_v<S, double>, typename Model::template Start<D>, NoStart>;
 
 /// Particles as bodies at the origin, their pairs and laws, in the scalar S. Derived classes pose
-/// the bodies, and have the members `separation(p)`, x_i - x_j; `may_touch(p, r)`, whether the
-/// bounding spheres of a pair of this separation touch, which excludes most pairs of a list at a
-/// tenth of the cost of a contact; `turned(n, first)`, a body rotated by its rotation variables;
-/// and `pair_in_long(p)`, the same pair in long doubles.
+/// the bodies, and have the members `separation(p)`, x_i - x_j; `fill(range, block, number)`, which
+/// adds those that may touch to a block; `turned(n, first)`, a body rotated by its rotation
+/// variables; and `pair_in_long(p)`, the same pair in long doubles.
 template <class ModelOf, int DIMENSION, class Scalar> class BodyPairs {
  public:
   using Model = ModelOf;
@@ -134,6 +133,15 @@ template <class ModelOf, int DIMENSION, class Scalar> class BodyPairs {
   const typename Model::Law &any_law() const { return common; }
   std::size_t first(std::size_t p) const { return pairs.particles[2 * p]; }
   std::size_t second(std::size_t p) const { return pairs.particles[2 * p + 1]; }
+
+  /// Whether the bounding spheres of a pair of this separation touch, or their gap is smaller than
+  /// a margin: excludes most pairs of a list at a tenth of the cost of a contact.
+  bool may_touch(std::size_t p, const Vec<D, S> &r) const { return may_be_closer(p, r, 0.0); }
+  bool may_be_closer(std::size_t p, const Vec<D, S> &r, double margin) const
+  {
+    const double reach = around[first(p)] + around[second(p)] + margin;
+    return norm_sq(r) < S(reach) * reach;
+  }
 
   /// The bodies of a pair of this separation, the second at the origin.
   Body first_body(std::size_t p, const Vec<D, S> &r) const
@@ -193,14 +201,19 @@ template <class Model, int D, class S> class PosedPairs : public BodyPairs<Model
     return separation_of<D, T>(poses, this->pairs, p);
   }
 
-  bool may_touch(std::size_t p, const Vec<D, S> &r) const { return may_be_closer(p, r, 0.0); }
-
-  /// Whether the gap between the bounding spheres of a pair of this separation is smaller than a
-  /// margin.
-  bool may_be_closer(std::size_t p, const Vec<D, S> &r, double margin) const
+  /// Adds to a block, until it is full, those of a range of pairs whose bounding spheres may be
+  /// closer than a margin, without k_e; and the number of each. Returns where to resume.
+  std::size_t fill(const Range &from, ContactBlock<D> &block, int *number,
+                   double margin = 0.0) const
   {
-    const double reach = this->around[first(p)] + this->around[second(p)] + margin;
-    return norm_sq(r) < S(reach) * reach;
+    std::size_t p = from.first;
+    for (; p < from.last && block.n < block.MOST; ++p) {
+      const Vec<D, S> r = separation(p);
+      block.put(static_cast<int>(first(p)), static_cast<int>(second(p)), r);
+      number[block.n] = static_cast<int>(p);
+      block.n += this->may_be_closer(p, r, margin);  // a branch would be unpredictable
+    }
+    return p;
   }
 
   /// The reference for errors of a contact.
@@ -461,22 +474,17 @@ template <class Pairs> class NumberedBlock {
 
   bool is_empty() const { return block.n == 0; }
 
-  /// Takes as many pairs as fit from the first on, of those for which `is_near(p, r)`; returns
-  /// where to resume.
-  template <class IsNear> std::size_t fill(const Range &from, const IsNear &is_near)
+  /// Takes as many near pairs as fit from the first on, within a margin if given; returns where to
+  /// resume.
+  template <class... Margin> std::size_t fill(const Range &from, Margin... margin)
   {
-    std::size_t p = from.first;
-    for (block.n = 0; p < from.last && block.n < block.MOST; ++p) {
-      const Vec<D> r = pairs.separation(p);
-      if constexpr (HAS_START) {
-        if (starts != nullptr) block.set_start(block.n, starts[p]);
-      }
-      number[block.n] = p;
-      block.put(static_cast<int>(pairs.first(p)), static_cast<int>(pairs.second(p)), r,
-                pairs.law(p).bond.k_e);
-      block.n += is_near(p, r);  // a branch would be unpredictable
+    block.n = 0;
+    const std::size_t next = pairs.fill(from, block, number, margin...);
+    for (int k = 0; k < block.n; ++k) block.k_e[k] = pairs.law(number[k]).bond.k_e;
+    if constexpr (HAS_START) {
+      for (int k = 0; starts != nullptr && k < block.n; ++k) block.set_start(k, starts[number[k]]);
     }
-    return p;
+    return next;
   }
 
   /// Calls `keep(p)` in order for those whose surfaces may be closer than a margin.
@@ -506,7 +514,7 @@ template <class Pairs> class NumberedBlock {
   const Pairs &pairs;
   Start *starts;
   ContactBlock<D> block;
-  std::size_t number[ContactBlock<D>::MOST];
+  int number[ContactBlock<D>::MOST];
 };
 
 /// Calls `keep(p)` in order for the pairs whose surfaces may be closer than a margin.
@@ -516,9 +524,8 @@ void each_closer(const Pairs &posed, double margin, const Keep &keep)
   if constexpr (PacksOf<typename Pairs::Model, Pairs::D>::CHOOSE) {
     if (auto *const find = packs_for(posed)) {
       NumberedBlock<Pairs> block(posed, nullptr);
-      const auto is_near = [&](auto p, const auto &r) { return posed.may_be_closer(p, r, margin); };
       for (std::size_t p = 0; p < posed.size();) {
-        p = block.fill({p, posed.size()}, is_near);
+        p = block.fill({p, posed.size()}, margin);
         if (!block.is_empty()) block.each_closer(margin, *find, keep);
       }
       return;
@@ -540,8 +547,7 @@ void sum_part(PairSums<Pairs::D, typename Pairs::S> &sums, const Pairs &pairs, b
     if (auto *const find = packs_for(pairs)) {
       NumberedBlock<Pairs> block(pairs, starts);
       for (std::size_t p = part.first; p < part.last;) {
-        p = block.fill({p, part.last},
-                       [&](auto q, const auto &r) { return pairs.may_touch(q, r); });
+        p = block.fill({p, part.last});
         if (!block.is_empty()) block.add_to(sums, *find);
       }
       return;
