@@ -61,19 +61,25 @@ template <int D> struct NearPairs {
   bool is_beyond(const BasePoses<D> &near, const Displacement &at, double kept = 0.0) const
   {
     const double stretch = 1.0 + at.strain;
-    double most = 0.0;
-    if (!near.any_turns()) {
-      most = stretch * near.longest(at.x, moved.data());
-    }
-    for (std::size_t i = 0; near.any_turns() && i < near.n_particles(); ++i) {
-      const double rotated =
-          near.turns(i) ? near.coordinates.turning_radius[i] * turned_to(near, at, i) : 0.0;
-      most = std::max(most, stretch * norm(shift_to(near, at, i)) + rotated);
-    }
+    const double most =
+        near.any_turns() ? farthest(near, at) : stretch * near.longest(at.x, moved.data());
     return 2.0 * most >= skin - kept - box_strain(stretch) * reach;
   }
 
  private:
+  /// Largest displacement of a point of any surface at a point, with the strain there.
+  double farthest(const BasePoses<D> &near, const Displacement &at) const
+  {
+    double most = 0.0;
+    for (std::size_t i = 0; i < near.n_particles(); ++i) {
+      const double shifted = (1.0 + at.strain) * norm(shift_to(near, at, i));
+      const double turning =
+          near.turns(i) ? near.coordinates.turning_radius[i] * turned_to(near, at, i) : 0.0;
+      most = std::max(most, shifted + turning);
+    }
+    return most;
+  }
+
   /// Change of a number.
   static Split since(const Poses::Numbers &now, const Poses::Numbers &then, std::size_t k)
   {

@@ -48,9 +48,9 @@ _FALLEN = 1e-2
 _UNJAMMED = 1e-3
 
 # A packing slides whose energy falls below this fraction of the expected one, which takes more evaluations than this and than
-# these for each particle, or, of round particles, whose energy has no kinks, which stalls far from rest. It is compressed, at
-# most this many times: at a fixed box the forces that drive the slide would fade, and with them its speed. Each time the root
-# of u that is linear in the strain grows by this factor, up to that at which the step began: there it takes fewer evaluations.
+# these for each particle, or, of round particles, whose energy has no kinks, which stalls far from rest below the energy at
+# which the step began. It is compressed, at most this many times: at a fixed box the forces that drive the slide would fade, and
+# with them its speed. Each time the root of u that is linear in the strain grows by this factor.
 _SLID, _MOST_PARTS, _DRIVEN = 0.7, 100, 2.0
 _LONG, _LONG_FOR_EACH = 10_000, 2
 
@@ -409,18 +409,20 @@ class Leading:
         if found.outcome is not Outcome.STALLED:
             return found.outcome is Outcome.EXHAUSTED
         has_kinks = not landscape.particles.is_round.all()
-        is_driven = self._driven(landscape) > self.root
-        return is_driven and not has_kinks and found.residual.largest > _GOOD
+        is_higher = self.root >= landscape.law.root(self.jammed.energy_density)
+        return not is_higher and not has_kinks and found.residual.largest > _GOOD
 
-    def _driven(self, landscape: Landscape) -> float:
-        """Return the root of u to which a packing that slides is compressed next."""
-        highest: float = landscape.law.root(self.jammed.energy_density)
-        return max(self.root, min(_DRIVEN * self.root, highest))
+    def _driven(self, landscape: Landscape, at: Minimum, target: Target) -> float:
+        """Return the root of u to which a packing that slides is compressed next, by no more than an unjammed one."""
+        now: float = landscape.law.root(at.energy_density)
+        root = _DRIVEN * self.root
+        strain = -_strain_to(landscape, at, root)
+        return root if strain <= target.step else now + target.step / strain * (root - now)
 
     def _begun(self, landscape: Landscape, target: Target) -> tuple[Minimum, str]:
         """Return the state to minimise next, and the method."""
         if self.unfinished is not None:
-            self.root = self._driven(landscape)
+            self.root = self._driven(landscape, self.unfinished, target)
             strain = _strain_to(landscape, self.unfinished, self.root)
             return replace(self.unfinished, state=self.unfinished.state.strained(strain)), "auto"
         self.parts = 0

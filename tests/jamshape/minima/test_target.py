@@ -225,36 +225,46 @@ def test_a_search_resumed_while_a_packing_slides_gives_the_same_bits():
     assert whole.residual.largest <= 1e-8
 
 
-def test_a_packing_that_slides_is_compressed_to_the_energy_that_is_expected_next(slides):
+def test_a_packing_that_slides_is_compressed_to_the_energy_that_is_expected_next_at_least(slides):
     landscape, state = long_rods()
-    for search in extrapolation(landscape, Search(state, 5e-4), Target(1e-12)):
+    target = Target(1e-12)
+    for search in extrapolation(landscape, Search(state, 5e-4), target):
         if search.leading is not None and search.leading.unfinished is not None:
             before, slid = len(slides), search.leading.unfinished
-            search.leading.advance(landscape, Target(1e-12))
+            search.leading.advance(landscape, target)
             assert slid.outcome is Outcome.UNJAMMED
-            assert slides[before] == pytest.approx(1, abs=1e-3), slides[before]
+            # A mean square grows at least as much as expected from its slope, and new contacts add to it.
+            assert 1 - 1e-3 <= slides[before] <= 2
             return
     pytest.fail("nothing slid")
 
 
 def test_a_packing_that_takes_long_is_compressed_to_higher_energies(monkeypatch):
-    """Each time to twice the root of u, up to that where the step began; it arrives at u0 in the end."""
+    """Each time to twice the root of u, or by the step of a search below jamming; it arrives at u0 in the end."""
     monkeypatch.setattr(target_of, "_LONG", 40)
     monkeypatch.setattr(target_of, "_LONG_FOR_EACH", 0)
     landscape, state = long_rods()
-    roots = []
-    for search in extrapolation(landscape, Search(state, 5e-4), Target(1e-12)):
+    target, starts, outcomes, limited = Target(1e-12), [], set(), []
+
+    def seen(landscape, start, method, stop, *more):
+        starts.append(start)
+        return minimise(landscape, start, method, stop, *more)
+
+    monkeypatch.setattr(target_of, "minimise", seen)
+    for search in extrapolation(landscape, Search(state, 5e-4), target):
         leading = search.leading
         if leading is None or leading.unfinished is None:
             continue
-        assert leading.unfinished.outcome is Outcome.EXHAUSTED
-        highest = leading.jammed.energy_density**0.5
-        before = leading.root
+        outcomes.add(leading.unfinished.outcome)
         again = copied(search).leading
-        again.advance(landscape, Target(1e-12))
-        assert again.root == pytest.approx(max(before, min(2 * before, highest)), rel=1e-12)
-        roots.append(again.root / before)
-    assert max(roots) == pytest.approx(2)
+        again.advance(landscape, target)
+        strain = 1 - (starts[-1].volume / leading.unfinished.state.volume) ** 0.5
+        limited.append(strain == pytest.approx(target.step, rel=1e-6))
+        assert strain <= target.step * (1 + 1e-6)
+        assert again.root == pytest.approx(2 * leading.root, rel=1e-12) or limited[-1]
+    assert Outcome.EXHAUSTED in outcomes <= {Outcome.EXHAUSTED, Outcome.UNJAMMED}
+    assert any(limited)
+    assert not all(limited)
     assert search.minimum.energy_density == pytest.approx(1e-12, rel=1e-7, abs=0)
     assert search.minimum.residual.largest <= 1e-8
 
