@@ -146,9 +146,9 @@ def energies_beside(landscape, minimum, size):
     return np.array(energies) / landscape.evaluate(minimum).energy
 
 
-# 288 ends on a kink, too, one side of which rises in second order only.
+# 124 and 288 end on a kink, too, one side of which rises in second order only.
 @chosen_by_seed
-@pytest.mark.parametrize("seed", [124, pytest.param(568, marks=pytest.mark.validate)])
+@pytest.mark.parametrize("seed", [430, pytest.param(568, marks=pytest.mark.validate)])
 def test_minimum_on_a_kink_is_proven_by_its_two_sides(seed, tmp_path):
     """The tips of two rods are level: a bond passes from one to the other."""
     out = tmp_path / "packing.h5"
