@@ -48,10 +48,33 @@ void shorten(int n, double by, const double *vector, FirstHalf *to)
   }
 }
 
+/// The sum of AT_ONCE numbers.
+float sum_of(const Floats (&in_parts)[AT_ONCE / LANES])
+{
+  float each[AT_ONCE];
+  std::memcpy(each, in_parts, sizeof(each));
+  for (int half = AT_ONCE / 2; half > 0; half /= 2) {
+    for (int m = 0; m < half; ++m) each[m] += each[m + half];
+  }
+  return each[0];
+}
+
 /// AT_ONCE sums with any set, so that all round identically.
-float add_and_dot(int n, float by, const FirstHalf *vector, const FirstHalf *further, float *x)
+float dot(int n, const FirstHalf *a, const FirstHalf *b)
 {
   Floats sum[AT_ONCE / LANES]{};  // in turns, since each addition waits for the one before
+  for (int k = 0; k < n; k += AT_ONCE) {
+    for (int m = 0; m < AT_ONCE / LANES; ++m) {
+      const int at = k + LANES * m;
+      sum[m] += in_single_precision(a + at) * in_single_precision(b + at);
+    }
+  }
+  return sum_of(sum);
+}
+
+float add_and_dot(int n, float by, const FirstHalf *vector, const FirstHalf *further, float *x)
+{
+  Floats sum[AT_ONCE / LANES]{};
   for (int k = 0; k < n; k += AT_ONCE) {
     for (int m = 0; m < AT_ONCE / LANES; ++m) {
       const int at = k + LANES * m;
@@ -62,19 +85,14 @@ float add_and_dot(int n, float by, const FirstHalf *vector, const FirstHalf *fur
       sum[m] += own * in_single_precision(further + at);
     }
   }
-  float each[AT_ONCE];
-  std::memcpy(each, sum, sizeof(each));
-  for (int half = AT_ONCE / 2; half > 0; half /= 2) {
-    for (int m = 0; m < half; ++m) each[m] += each[m + half];
-  }
-  return each[0];
+  return sum_of(sum);
 }
 
 }  // namespace
 
 template <InstructionSet SET> HistoryKernels history_kernels_of()
 {
-  return {&shorten, &add_and_dot};
+  return {&shorten, &dot, &add_and_dot};
 }
 
 template HistoryKernels history_kernels_of<InstructionSet::JAMSHAPE_SET>();

@@ -16,6 +16,8 @@ struct HistoryKernels {
 
   /// Rounds `by` times a vector (n,).
   void (*shorten)(int n, double by, const double *vector, FirstHalf *to);
+  /// The dot product of two vectors (n,), n a multiple of AT_ONCE.
+  float (*dot)(int n, const FirstHalf *a, const FirstHalf *b);
   /// Adds `by` times a vector (n,) to x, and returns the dot product of x and a further one; n is a
   /// multiple of AT_ONCE.
   float (*add_and_dot)(int n, float by, const FirstHalf *vector, const FirstHalf *further,

@@ -33,7 +33,12 @@ class QuasiNewton {
     }
     shorten(step, 1.0 / length, added.step);
     shorten(change, 1.0 / length, added.change);
-    added.inverse = length * length / curvature;
+    // Of the rounded vectors: with that of exact ones, directions would not belong to a positive
+    // definite matrix.
+    const double of_rounded =
+        kernels.dot(static_cast<int>(added.step.size()), added.step.data(), added.change.data());
+    if (!(of_rounded > 0.0)) return;
+    added.inverse = 1.0 / of_rounded;
     pairs.push_back(std::move(added));
   }
 
