@@ -118,7 +118,8 @@ def _squeezed(packing, overlap):
 @cache
 def pressed(case):
     """Squeezed, and kicked off the minimum, so that forces do not cancel."""
-    return kicked(squeezed(case), 0.031)
+    tries = (kicked(squeezed(case), 0.031, seed) for seed in range(2, 20))
+    return next(packing for packing in tries if keeps_its_bonds(packing))
 
 
 @cache
@@ -154,7 +155,7 @@ def kicked(packing, size, seed=2):
 @cache
 def in_a_small_box(case):
     """Two particles in a box that is shorter than they are, one of which touches an image of itself."""
-    packing = scattered(case, 2, seed=4)
+    packing = scattered(case, 2, seed=17)
     landscape, state = Landscape(packing, sides=SIDES), State.of(packing)
     for _ in range(300):
         state = minimise(landscape, state, "auto", ROUGH).state

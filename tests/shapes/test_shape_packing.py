@@ -49,7 +49,7 @@ from methods.lbfgs import lbfgs
 
 # What is asked for: the energy density, how well it is met, and what may be left of the forces.
 U0, ACCURACY, RESIDUAL = 1e-10, 1e-7, 1e-8
-TARGET, AT_JAMMING = Target(U0), Target(1e-14)
+TARGET, AT_JAMMING = Target(U0), Target(1e-16)
 
 # Coarse, since the energy is led to its target from wherever this ends.
 QUASISTATIC = Quasistatic(step=0.03, energy=1e-6, closeness=2.0, tolerance=1e-3)

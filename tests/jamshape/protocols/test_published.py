@@ -40,7 +40,7 @@ STRAINS = (
 @cache
 def frames():
     """A rod packing that is squeezed from well below jamming to well above."""
-    packing, state = quickly_squeezed(16, 1, 0.86)
+    packing, state = quickly_squeezed(16, 1, 0.86, 2)
     loose = state.strained(0.02).packing(packing)
     start = State.of(loose.with_(position=loose.position, orientation=loose.orientation))
     states = [start.strained(-strain) for strain in STRAINS]

@@ -178,7 +178,7 @@ def test_before_a_search_long_minimisations_are_left_once_in_a_row(monkeypatch):
     monkeypatch.setattr(quasistatic, "_PART", 60)
     monkeypatch.setattr(quasistatic, "_BRIEF", 60)
     rough = replace(ADAPTIVE, closeness=math.inf)
-    landscape, compression, protocol = begun(n=28, phi=0.5, protocol=rough)
+    landscape, compression, protocol = begun(n=30, phi=0.5, protocol=rough)
     left, loose = [], compression.loose
     for at in compress(landscape, compression, protocol):
         if at.loose is loose:  # a part of a minimisation
@@ -187,7 +187,7 @@ def test_before_a_search_long_minimisations_are_left_once_in_a_row(monkeypatch):
         left.append(at.left)
         if at.left:  # what a step of compression adds to a jammed packing would be as much
             assert at.parts == 0
-            per_particle = landscape.evaluate(at.loose).energy / 28
+            per_particle = landscape.evaluate(at.loose).energy / 30
             assert 1 < per_particle / protocol.energy <= quasistatic._LITTLE
             assert at.phi == pytest.approx(at.loose_phi + at.step, rel=1e-12)
     assert any(left)
