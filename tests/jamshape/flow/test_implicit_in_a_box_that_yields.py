@@ -324,7 +324,10 @@ def test_a_pressure_that_contacts_do_not_bear_ends_in_a_sentence():
 def test_a_pressure_that_crosses_particles_ends_in_a_sentence():
     sentence = r"the spines of particles \d+ and \d+ cross at phi = .* and the pressure 1, .* use a smaller pressure"
     with pytest.raises(CrossingError, match=sentence):
-        flowed(dense("rods", seed=2), SlowShear(1e-3, 5.0, tolerance=1e-1, hold_pressure=1.0, t_box=1.0))
+        flowed(
+            dense("rods", seed=2),
+            SlowShear(1e-3, 5.0, tolerance=1e-1, hold_pressure=1.0, t_box=1.0),
+        )
 
 
 def test_slow_rates_take_implicit_steps_at_a_pressure_by_themselves(tmp_path):
