@@ -104,49 +104,35 @@ template <int D>
   return last;
 }
 
-/// The largest squared length of vectors that `load(n, to)` loads, in packs from the n-th on, and
-/// whose components `component(c)` returns.
-template <int D, class Load, class Component>
-double longest_sq(std::size_t N, const Load &load, const Component &component)
-{
-  Pack longest = 0.0;
-  std::size_t n = 0;
-  for (; n + LANES + 1 < N; n += LANES) {  // four numbers may be read beyond the last vector
-    Pack vectors[4], sum = 0.0;
-    load(n, vectors);
-    for (int a = 0; a < D; ++a) sum += vectors[a] * vectors[a];
-    longest = most(longest, sum);
-  }
-  double found = 0.0;
-  for (int k = 0; k < LANES; ++k) found = std::max(found, longest.lanes[k]);
-  for (; n < N; ++n) {
-    double sum = 0.0;
-    for (int a = 0; a < D; ++a) sum += component(D * n + a) * component(D * n + a);
-    found = std::max(found, sum);
-  }
-  return found;
-}
-
 template <int D>
 [[gnu::flatten]] double longest_sq(std::size_t N, const double *vectors, const double *others)
 {
   const auto load = [](const double *from, std::size_t n, Pack(&to)[4]) {
     load_fours([&](int k) { return from + D * (n + k); }, to);
   };
-  if (others == nullptr) {
-    return longest_sq<D>(
-        N, [&](std::size_t n, Pack(&to)[4]) { load(vectors, n, to); },
-        [&](std::size_t c) { return vectors[c]; });
+  Pack longest = 0.0;
+  std::size_t n = 0;
+  for (; n + LANES + 1 < N; n += LANES) {  // four numbers may be read beyond the last vector
+    Pack own[4], other[4], sum = 0.0;
+    load(vectors, n, own);
+    if (others != nullptr) {
+      load(others, n, other);
+      for (int a = 0; a < D; ++a) own[a] += other[a];
+    }
+    for (int a = 0; a < D; ++a) sum += own[a] * own[a];
+    longest = most(longest, sum);
   }
-  return longest_sq<D>(
-      N,
-      [&](std::size_t n, Pack(&to)[4]) {
-        Pack other[4];
-        load(vectors, n, to);
-        load(others, n, other);
-        for (int a = 0; a < D; ++a) to[a] += other[a];
-      },
-      [&](std::size_t c) { return vectors[c] + others[c]; });
+  double found = 0.0;
+  for (int k = 0; k < LANES; ++k) found = std::max(found, longest.lanes[k]);
+  for (; n < N; ++n) {
+    double sum = 0.0;
+    for (std::size_t c = D * n; c < D * (n + 1); ++c) {
+      const double own = others == nullptr ? vectors[c] : vectors[c] + others[c];
+      sum += own * own;
+    }
+    found = std::max(found, sum);
+  }
+  return found;
 }
 
 }  // namespace

@@ -13,7 +13,7 @@ namespace jamshape {
 
 /// Directions of the limited-memory BFGS method (Nocedal & Wright, Numerical Optimization,
 /// Alg. 7.4). Steps are remembered to eight bits, and directions computed in single precision: a
-/// step of a minimisation takes less time, and minimisations as many steps.
+/// step of a minimisation takes less time.
 class QuasiNewton {
  public:
   using Vector = Eigen::VectorXd;

@@ -409,8 +409,8 @@ class Leading:
         if found.outcome is not Outcome.STALLED:
             return found.outcome is Outcome.EXHAUSTED
         has_kinks = not landscape.particles.is_round.all()
-        is_higher = self.root >= landscape.law.root(self.jammed.energy_density)
-        return not is_higher and not has_kinks and found.residual.largest > _GOOD
+        is_below = self.root < landscape.law.root(self.jammed.energy_density)
+        return is_below and not has_kinks and found.residual.largest > _GOOD
 
     def _driven(self, landscape: Landscape, at: Minimum, target: Target) -> float:
         """Return the root of u to which a packing that slides is compressed next, by no more than an unjammed one."""

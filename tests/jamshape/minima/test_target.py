@@ -225,7 +225,9 @@ def test_a_search_resumed_while_a_packing_slides_gives_the_same_bits():
     assert whole.residual.largest <= 1e-8
 
 
-def test_a_packing_that_slides_is_compressed_to_the_energy_that_is_expected_next_at_least(slides):
+def test_a_packing_that_slides_is_compressed_to_the_energy_that_is_expected(slides, monkeypatch):
+    """To the same one as before, since only for small strains energies follow from their slope."""
+    monkeypatch.setattr(target_of, "_DRIVEN", 1.0)
     landscape, state = long_rods()
     target = Target(1e-12)
     for search in extrapolation(landscape, Search(state, 5e-4), target):
@@ -233,8 +235,7 @@ def test_a_packing_that_slides_is_compressed_to_the_energy_that_is_expected_next
             before, slid = len(slides), search.leading.unfinished
             search.leading.advance(landscape, target)
             assert slid.outcome is Outcome.UNJAMMED
-            # A mean square grows at least as much as expected from its slope, and new contacts add to it.
-            assert 1 - 1e-3 <= slides[before] <= 2
+            assert slides[before] == pytest.approx(1, abs=1e-3), slides[before]
             return
     pytest.fail("nothing slid")
 
