@@ -47,8 +47,8 @@ _FALLEN = 1e-2
 # Likewise for this fraction of the energy that a compression step adds to a jammed packing.
 _UNJAMMED = 1e-3
 
-# A packing slides whose energy falls below this fraction of the expected one, which takes more evaluations than this and than
-# these for each particle, or, of round particles, whose energy has no kinks, which stalls far from rest below the energy at
+# A packing slides whose energy falls below this fraction of the expected one, or which, far from rest, takes more evaluations
+# than this and than these for each particle or, of round particles, whose energy has no kinks, stalls below the energy at
 # which the step began. It is compressed, at most this many times: at a fixed box the forces that drive the slide would fade, and
 # with them its speed. Each time the root of u that is linear in the strain grows by this factor.
 _SLID, _MOST_PARTS, _DRIVEN = 0.7, 100, 2.0
@@ -403,14 +403,14 @@ class Leading:
         return self._end(landscape, target) if self._is_there(target) else None
 
     def _slides(self, landscape: Landscape, found: Minimum) -> bool:
-        """Whether a jammed packing takes long or stalls far from rest, on no kink, and may be compressed."""
-        if self.parts == _MOST_PARTS:
+        """Whether a jammed packing far from rest takes long or stalls, on no kink, and may be compressed."""
+        if self.parts == _MOST_PARTS or found.residual.largest <= _GOOD:
             return False
         if found.outcome is not Outcome.STALLED:
             return found.outcome is Outcome.EXHAUSTED
         has_kinks = not landscape.particles.is_round.all()
         is_below = self.root < landscape.law.root(self.jammed.energy_density)
-        return is_below and not has_kinks and found.residual.largest > _GOOD
+        return is_below and not has_kinks
 
     def _driven(self, landscape: Landscape, at: Minimum, target: Target) -> float:
         """Return the root of u to which a packing that slides is compressed next, by no more than an unjammed one."""
@@ -451,7 +451,7 @@ class Leading:
         left, u = self.jammed.residual.largest, self.jammed.energy_density
         if self.least is None or left < self.least or not target.is_met(u):
             self.least, self.stalls = left, 0
-        elif self.jammed.outcome is Outcome.STALLED:
+        elif self.jammed.outcome is not Outcome.CONVERGED:
             self.stalls += 1
         if self.n_minima == _MOST_MINIMA or self.stalls == _MOST_STALLS:
             return True
