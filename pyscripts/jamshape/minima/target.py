@@ -50,7 +50,8 @@ _UNJAMMED = 1e-3
 # A packing slides whose energy falls below this fraction of the expected one, or which, far from rest, takes more evaluations
 # than this and than these for each particle or, of round particles, whose energy has no kinks, stalls below the energy at
 # which the step began. It is compressed, at most this many times: at a fixed box the forces that drive the slide would fade, and
-# with them its speed. Each time the root of u that is linear in the strain grows by this factor.
+# with them its speed. Each time the root of u that is linear in the strain grows by this factor, up to that times the one at
+# which the step began: compressed further, it has far to go back, on which it may slide again.
 _SLID, _MOST_PARTS, _DRIVEN = 0.7, 100, 2.0
 _LONG, _LONG_FOR_EACH = 10_000, 2
 
@@ -341,7 +342,7 @@ class Leading:
     """A minimum on its way to u0, between two minimisations, with all that is needed to resume it.
 
     The box is strained to where the root of u that is linear in the strain reaches that of u0. Where that opens the
-    packing, fractions of the strain are tried. One that slides is compressed, to ever higher energies, until it is at rest. A
+    packing, fractions of the strain are tried. One that slides is compressed, to higher energies, until it is at rest. A
     minimum that stalls at u0, where a contact is about to open or close, is approached again from a higher energy.
 
     Parameters
@@ -415,7 +416,7 @@ class Leading:
     def _driven(self, landscape: Landscape, at: Minimum, target: Target) -> float:
         """Return the root of u to which a packing that slides is compressed next, by no more than an unjammed one."""
         now: float = landscape.law.root(at.energy_density)
-        root = _DRIVEN * self.root
+        root: float = _DRIVEN * min(self.root, landscape.law.root(self.jammed.energy_density))
         strain = -_strain_to(landscape, at, root)
         return root if strain <= target.step else now + target.step / strain * (root - now)
 
