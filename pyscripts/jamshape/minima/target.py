@@ -416,7 +416,8 @@ class Leading:
     def _driven(self, landscape: Landscape, at: Minimum, target: Target) -> float:
         """Return the root of u to which a packing that slides is compressed next, by no more than an unjammed one."""
         now: float = landscape.law.root(at.energy_density)
-        root: float = _DRIVEN * min(self.root, landscape.law.root(self.jammed.energy_density))
+        most: float = _DRIVEN * landscape.law.root(self.jammed.energy_density)
+        root = max(now, min(_DRIVEN * self.root, most))
         strain = -_strain_to(landscape, at, root)
         return root if strain <= target.step else now + target.step / strain * (root - now)
 
