@@ -414,7 +414,7 @@ class Leading:
         return is_below and not has_kinks
 
     def _driven(self, landscape: Landscape, at: Minimum, target: Target) -> float:
-        """Return the root of u to which a packing that slides is compressed next, by no more than an unjammed one."""
+        """Return the root of u to which a packing that slides is compressed next, by no more than a step below jamming."""
         now: float = landscape.law.root(at.energy_density)
         most: float = _DRIVEN * landscape.law.root(self.jammed.energy_density)
         root = max(now, min(_DRIVEN * self.root, most))

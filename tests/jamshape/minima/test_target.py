@@ -276,35 +276,31 @@ def test_a_packing_that_takes_long_is_compressed_to_higher_energies(monkeypatch)
     assert search.minimum.residual.largest <= 1e-8
 
 
+def begun_at(start, monkeypatch, outcome, force):
+    """A way to u0 whose minimisations end like this, with such forces."""
+    landscape, state = start_of(start)
+    jammed = find(landscape, state, Target(1e-6))
+
+    def ended(*of):
+        left = minimise(*of)
+        return replace(left, outcome=outcome, residual=left.residual._replace(force=force))
+
+    monkeypatch.setattr(target_of, "minimise", ended)
+    return landscape, Leading(jammed, jammed, is_new=False, aim=1e-12, tolerance=1e-8)
+
+
 @pytest.mark.parametrize(("force", "is_driven"), [(0.1, True), (1e-3, False)])
 def test_what_takes_long_is_compressed_only_far_from_rest(force, is_driven, monkeypatch):
-    landscape, state = start_of("16 rods")
-    jammed = find(landscape, state, Target(1e-6))
-    leading = Leading(jammed, jammed, is_new=False, aim=1e-12, tolerance=1e-8)
-
-    def exhausted(landscape, start, method, stop, *more):
-        left = minimise(landscape, start, method, stop, *more)
-        residual = left.residual._replace(force=force)
-        return replace(left, outcome=Outcome.EXHAUSTED, residual=residual)
-
-    monkeypatch.setattr(target_of, "minimise", exhausted)
+    landscape, leading = begun_at("16 rods", monkeypatch, Outcome.EXHAUSTED, force)
     leading.advance(landscape, Target(1e-12))
     assert (leading.unfinished is not None) == is_driven
-    assert (leading.jammed is jammed) == is_driven
+    assert (leading.jammed is leading.start) == is_driven
 
 
 @pytest.mark.parametrize(("start", "is_driven"), [("16 discs", True), ("16 rods", False)])
 def test_round_particles_that_stall_far_from_rest_are_compressed(start, is_driven, monkeypatch):
     """Others may have stalled on a kink."""
-    landscape, state = start_of(start)
-    jammed = find(landscape, state, Target(1e-6))
-    leading = Leading(jammed, jammed, is_new=False, aim=1e-12, tolerance=1e-8)
-
-    def stalled(landscape, start, method, stop, *more):
-        found = minimise(landscape, start, method, stop, *more)
-        return replace(found, outcome=Outcome.STALLED, residual=found.residual._replace(force=0.1))
-
-    monkeypatch.setattr(target_of, "minimise", stalled)
+    landscape, leading = begun_at(start, monkeypatch, Outcome.STALLED, 0.1)
     leading.advance(landscape, Target(1e-12))
     root = leading.root
     assert root < 0.5e-3
