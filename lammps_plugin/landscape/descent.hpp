@@ -22,7 +22,7 @@ struct DescentStop {
   double seconds;            // or after this time
   double rounding;           // residual due to rounding of doubles, times the mean force of a bond
   std::int64_t patience;     // stalled after this many without a gain
-  double newton_below;       // residual below which Newton's method replaces L-BFGS
+  double newton_below;       // residual below which complete factors replace L-BFGS
   bool is_near;              // also starts with Newton's method, as long as that gains
   StepBounds step;
 };
@@ -101,7 +101,8 @@ class Descent {
   Descent(LocalEnergyModel &landscape, const DescentStop &when, double first_shift) :
       about(landscape), stop(when), system(landscape, first_shift),
       memory(landscape.dimension() == 2 ? REMEMBERED_IN_2D : REMEMBERED_IN_3D),
-      by_newton(when.is_near), is_near(when.is_near), newton_below(when.newton_below)
+      by_newton(when.is_near), is_near(when.is_near),
+      newton_below(when.newton_below * (landscape.has_complete_factors() ? 1.0 : BY_ITERATIONS))
   {
   }
 
@@ -140,6 +141,10 @@ class Descent {
   /// fall, but contacts close one by one until a minimum is reached: that counts for Newton's
   /// method.
   static constexpr double LESS_ENERGY = 0.98, LESS_RESIDUAL = 0.7;
+  /// Without complete factors Newton's method takes over below this multiple of the residual: a
+  /// step of it lets contacts open and close as one of L-BFGS does, and costs as much as tens of
+  /// them.
+  static constexpr double BY_ITERATIONS = 0.01;
   /// L-BFGS gains in waves: Newton's method takes over only after this many evaluations without a
   /// gain.
   static constexpr std::int64_t SLOW = 2000;

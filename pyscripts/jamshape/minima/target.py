@@ -18,8 +18,9 @@ from jamshape.packing import State
 # A minimum with this residual is jammed.
 _GOOD = 1e-2
 
-# Residual at which linear response holds: rods that slide along flat sides, the faster the
-# higher the energy, have come to rest. A move is undone if it leaves a larger residual.
+# Residual of minima on the way to u0. Particles that rotate along soft modes, as rods that slide along flat sides, the faster
+# the higher the energy, have come to rest there. In 2D Newton's method reaches it in a few steps; for spheres, which have no
+# such modes, a jammed minimum is good enough.
 _GOOD_TO_MOVE = 1e-4
 
 # Residual left by sliding is smaller than this.
@@ -489,11 +490,17 @@ def _relaxed(landscape: Landscape, at: Minimum, target: Target, u: float, method
     it slides.
     """
     near = abs(landscape.law.root(u / target.u0) - 1) < _NEAR
-    tolerance = target.tolerance if near else max(target.tolerance, _GOOD_TO_MOVE)
+    tolerance = target.tolerance if near else max(target.tolerance, _good_to_move(landscape))
     lowest = fraction_of_energy(landscape, _FALLEN if near else _SLID) * u
     most = max(_LONG, _LONG_FOR_EACH * landscape.particles.n)
     stop = Stop(tolerance, lowest=lowest, evaluations=most, kinks=near)
     return minimise(landscape, at.state, method, stop, at.history)
+
+
+def _good_to_move(landscape: Landscape) -> float:
+    """Return the residual at which linear response leads on."""
+    particles = landscape.particles
+    return _GOOD if particles.dimension == 3 and particles.is_round.all() else _GOOD_TO_MOVE
 
 
 def nearer(landscape: Landscape, at: Minimum, u0: float) -> State:

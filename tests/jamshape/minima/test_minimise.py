@@ -8,6 +8,7 @@ from scenes import make, pressed
 from squeezed import quickly_squeezed
 from superellipsoid_packings import ellipsoids, octahedra_and_boxes, superellipses
 
+from jamshape import _contact
 from jamshape.landscape import CrossingError, Landscape, State
 from jamshape.landscape.local_energy_model import DescentEnd, LocalEnergyModel
 from jamshape.minima import (
@@ -19,6 +20,7 @@ from jamshape.minima import (
     rounding_floor,
 )
 from jamshape.protocols.random_start import random_packing
+from jamshape.shapes.particles import Particles
 from methods.lammps_cg import lammps_cg
 from methods.lbfgs import lbfgs
 
@@ -54,6 +56,26 @@ def test_after_a_stall_only_in_the_plane_newtons_method_alone_goes_on(dimension,
     first, second = handovers
     assert first < 1
     assert second == (np.inf if dimension == 2 else first)
+
+
+@pytest.mark.parametrize(("dimension", "phi", "least"), [(2, 0.9, 1e-2), (3, 0.75, 1e-4)])
+def test_iterations_take_over_later_than_complete_factors(dimension, phi, least, monkeypatch):
+    round_ones = Particles.of("spherocylinder", alpha=0)
+    packing = random_packing(216, 0.25, 1, round_ones, dimension=dimension)
+    landscape = Landscape(packing)
+    start = State.of(packing).strained((0.25 / phi) ** (1 / dimension) - 1)
+    products, descend = [], _contact.LocalEnergyModel.descend
+
+    def counted(*of):
+        end = descend(*of)
+        products.append(end.products)
+        return end
+
+    monkeypatch.setattr(_contact.LocalEnergyModel, "descend", counted)
+    for tolerance in (1.1 * least, 1e-8):
+        assert minimise(landscape, start, "auto", Stop(tolerance)).outcome is Outcome.CONVERGED
+    assert products[0] == 0
+    assert products[1] > 0
 
 
 @pytest.fixture(params=JAMMED)
