@@ -40,7 +40,7 @@ BELOW, FIRST, LEADING, REST = (
     "the rest",
 )
 
-# Minimisations of the search that need be no better than this look for a jammed state.
+# Minimisations of the search that need be no better than this, and may end on kinks, look for a jammed state.
 LOOSE = 1e-2
 
 
@@ -94,7 +94,8 @@ class Profile:
     def _counted(self, *, searches: bool) -> Callable[..., Minimum]:
         @functools.wraps(minimise)
         def counted(landscape: Any, start: Any, method: str, stop: Stop, *more: Any) -> Minimum:
-            name = (FIRST if stop.tolerance >= LOOSE else LEADING) if searches else BELOW
+            is_first = stop.kinks and stop.tolerance >= LOOSE
+            name = (FIRST if is_first else LEADING) if searches else BELOW
             part = self._now = self.parts[name]
             before, began = landscape.evaluations, time.process_time()
             found = minimise(landscape, start, method, stop, *more)
