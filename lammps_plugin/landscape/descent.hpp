@@ -22,7 +22,7 @@ struct DescentStop {
   double seconds;            // or after this time
   double rounding;           // residual due to rounding of doubles, times the mean force of a bond
   std::int64_t patience;     // stalled after this many without a gain
-  double newton_below;       // residual below which complete factors replace L-BFGS
+  double newton_below;       // residual below which Newton's method by factors replaces L-BFGS
   bool is_near;              // also starts with Newton's method, as long as that gains
   StepBounds step;
 };

@@ -498,7 +498,7 @@ def _relaxed(landscape: Landscape, at: Minimum, target: Target, u: float, method
 
 
 def _good_to_move(landscape: Landscape) -> float:
-    """Return the residual at which linear response leads on."""
+    """Return the largest residual of a minimum on the way to u0."""
     particles = landscape.particles
     return _GOOD if particles.dimension == 3 and particles.is_round.all() else _GOOD_TO_MOVE
 
