@@ -20,6 +20,7 @@ output is one JSON object.
 
 from __future__ import annotations
 
+import warnings
 from argparse import ArgumentParser, Namespace
 from dataclasses import replace
 from functools import partial
@@ -94,7 +95,9 @@ def made(case: Case) -> Packing:
     """Make the packing of the first seed, from that of the case on, that ends at a minimum: at no saddle, and as floppy as asked."""
     settings: dict[str, Any] = {"n": case.n, "u0": case.u0, "dimension": case.dimension}
     for seed in range(case.seed, case.seed + SEEDS):
-        packing = js.make_packing(case.particles, seed=seed, progress=False, **settings)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", js.NotReachedWarning)  # the next seed is tried
+            packing = js.make_packing(case.particles, seed=seed, progress=False, **settings)
         modes = js.modes(packing, force=True)
         is_floppy = modes.moduli.n_floppy > 0 or not case.floppy
         is_minimum = modes.table.attributes["residual"] < GOOD and (modes["sign"] >= 0).all()
