@@ -27,6 +27,14 @@ def quickly_squeezed(n, alpha, phi, seed=1):
     return _brought_to(phi, start, "auto")
 
 
+def squeezed_at_once(n, particles, dimension):
+    """Far beyond jamming in one step; the landscape, and a state away from its minimum."""
+    phi = {2: 0.9, 3: 0.75}[dimension]
+    packing = random_packing(n, 0.25, 1, particles, dimension=dimension)
+    strain = (0.25 / phi) ** (1 / dimension) - 1
+    return Landscape(packing), State.of(packing).strained(strain)
+
+
 def _brought_to(phi, packing, method):
     landscape, state = Landscape(packing), State.of(packing)
     while (now := state.packing(packing).phi) < phi * (1 - 1e-12):

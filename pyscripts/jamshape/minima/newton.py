@@ -9,7 +9,8 @@ from jamshape.landscape.newton import LONGEST_STEP, WIDEST_TURN, least_shift
 from jamshape.minima.descent import Descent, Outcome, rounding_of_a_bond
 from jamshape.minima.nonsmooth import relax
 
-# L-BFGS, cheap while contacts open and close, hands over to Newton's method below this residual.
+# L-BFGS, cheap while contacts open and close, hands over to Newton's method below this residual; later where its equations are
+# solved by iterations (landscape/descent.hpp).
 _NEWTON_BELOW = 1e-2
 
 # Evaluations without a gain after which a minimisation has stalled, usually on a kink; and, for a tolerance this fine, after

@@ -18,9 +18,9 @@ from jamshape.packing import State
 # A minimum with this residual is jammed.
 _GOOD = 1e-2
 
-# Residual of minima on the way to u0. Particles that rotate along soft modes, as rods that slide along flat sides, the faster
-# the higher the energy, have come to rest there. In 2D Newton's method reaches it in a few steps; for spheres, which have no
-# such modes, a jammed minimum is good enough.
+# Largest residual of minima on the way to u0: particles that rotate along soft modes, as rods that slide along flat sides,
+# have come to rest. In 2D Newton's method reaches it in a few steps; for spheres, which have no such modes, a jammed
+# minimum is good enough.
 _GOOD_TO_MOVE = 1e-4
 
 # Residual left by sliding is smaller than this.

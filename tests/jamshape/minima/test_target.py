@@ -6,10 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from squeezed import quickly_squeezed
+from squeezed import quickly_squeezed, squeezed_at_once
 
 from jamshape.contacts import coordination, find_contacts
-from jamshape.landscape import Landscape, State
+from jamshape.landscape import Landscape
 from jamshape.minima import History, Outcome, minimise, residual_of
 from jamshape.minima import target as target_of
 from jamshape.minima.checkpoints import search_of, told_search
@@ -22,7 +22,6 @@ from jamshape.minima.target import (
     extrapolation,
     find,
 )
-from jamshape.protocols.random_start import random_packing
 from jamshape.shapes.particles import Particles
 
 # n, alpha, and the packing fraction just below jamming where the search begins
@@ -299,23 +298,17 @@ def test_what_takes_long_is_compressed_only_far_from_rest(force, is_driven, monk
     assert (leading.jammed is leading.start) == is_driven
 
 
-SPHEROIDS = {"p": 1.0, "w1": 0.6, "w2": 1.0}
-
-
 @pytest.mark.parametrize(
-    ("style", "about", "dimension", "tolerance"),
+    ("particles", "dimension", "tolerance"),
     [
-        ("superellipsoid", SPHEROIDS | {"w1": 1.0}, 3, 1e-2),
-        ("superellipsoid", SPHEROIDS, 3, 1e-4),
-        ("spherocylinder", {"alpha": 0.0}, 2, 1e-4),
+        (Particles.of("superellipsoid", p=1.0, w1=1.0, w2=1.0), 3, 1e-2),
+        (Particles.of("superellipsoid", p=1.0, w1=0.6, w2=1.0), 3, 1e-4),
+        (Particles.of("spherocylinder", alpha=0.0), 2, 1e-4),
     ],
     ids=["spheres", "spheroids", "discs"],
 )
-def test_spheres_are_led_on_from_rough_minima(style, about, dimension, tolerance, monkeypatch):
-    particles = Particles.of(style, **about)
-    packing = random_packing(32, 0.25, 1, particles, dimension=dimension)
-    landscape, phi = Landscape(packing), {2: 0.9, 3: 0.75}[dimension]
-    dense = State.of(packing).strained((0.25 / phi) ** (1 / dimension) - 1)
+def test_spheres_are_led_on_from_rough_minima(particles, dimension, tolerance, monkeypatch):
+    landscape, dense = squeezed_at_once(32, particles, dimension)
     jammed = minimise(landscape, dense)
     assert jammed.energy_density > 1e-5
     tolerances = []
@@ -325,9 +318,8 @@ def test_spheres_are_led_on_from_rough_minima(style, about, dimension, tolerance
         return minimise(landscape, start, method, stop, *more)
 
     monkeypatch.setattr(target_of, "minimise", told)
-    Leading(jammed, jammed, is_new=False, aim=1e-12, tolerance=1e-8).advance(
-        landscape, Target(1e-12)
-    )
+    leading = Leading(jammed, jammed, is_new=False, aim=1e-12, tolerance=1e-8)
+    leading.advance(landscape, Target(1e-12))
     assert tolerances == [tolerance]
 
 
