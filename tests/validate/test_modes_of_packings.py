@@ -123,11 +123,11 @@ def forces_are_self_stress(matrix):
 
 
 @pytest.mark.parametrize(
-    ("alpha", "u0"), [(1e-6, 1e-15), (50.0, 1e-15), (0.01, 1e-18), (4.0, 1e-18)]
+    ("alpha", "u0", "seed"), [(1e-6, 1e-15, 4), (50.0, 1e-15, 1), (0.01, 1e-18, 1), (4.0, 1e-18, 1)]
 )
-def test_modes_of_extremes(alpha, u0, tmp_path):
+def test_modes_of_extremes(alpha, u0, seed, tmp_path):
     phi = 0.4 if alpha < 10 else 0.15
-    sample = Recipe(bidisperse(alpha), n=32, phi_start=phi)
+    sample = Recipe(bidisperse(alpha), n=32, phi_start=phi, seed=seed)
     sample = replace(sample, way=Dynamics(Approach(kappa=1e-5)), target=Target(u0=u0))
     make(sample, tmp_path / "packing.h5")
     packing = read_packing(tmp_path / "packing.h5")
@@ -136,7 +136,8 @@ def test_modes_of_extremes(alpha, u0, tmp_path):
     further = sum(r.n_states for r in redundancies(matrix))
     print(f"alpha {alpha}, u0 {u0}: {counts}, {further} more states of self stress")
     assert counts.rank == counts.n_bonds - forces_are_self_stress(matrix) - further
-    assert forces_are_self_stress(matrix) == (alpha > 1e-4)  # overlaps are 1e-8 d
+    # Overlaps are 1e-8 d. Seed 4 of 1e-6 has a contact that needs its own gradient; seeds 2, 3 and 8 have none.
+    assert forces_are_self_stress(matrix) == (alpha > 1e-4)
     assert counts.n_modes == counts.rank + counts.n_floppy + counts.n_translations
     assert (~found.is_translation & (found.sign != 0)).sum() >= counts.rank
     assert_four_digits(packing, matrix, found)
