@@ -115,8 +115,8 @@ def test_low_band_at_alpha_4_is_single_rods_that_slide(packings):
 def forces_are_self_stress(matrix):
     """Whether forces along the bonds alone balance.
 
-    They do unless overlaps are above A_min^2 / d: the energy of a side-to-side contact then depends on more than the
-    lengths of its two bonds (`EndExponent`), and pushes by other gradients than theirs.
+    They do unless overlaps are above A_min^2 / d: the energy of a side-to-side contact may then depend on more than the
+    lengths of its two bonds (`EndExponent`), and push by other gradients than theirs.
     """
     forces = matrix.bonds.pull / np.linalg.norm(matrix.bonds.pull)
     return bool(np.linalg.norm(matrix.compatibility.T @ forces) < 1e-6)

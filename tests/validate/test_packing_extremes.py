@@ -26,7 +26,7 @@ def discs_and_rods(n):
 
 
 EXTREMES = {
-    # Of others, a third end on kinks far from u0: docs/results/stability.md
+    # Many other seeds stall on kinks: docs/results/stability.md, known failures
     "alpha 1e-6": {"particles": bidisperse(1e-6), "seed": 2},
     "alpha 1e-3": {"particles": bidisperse(1e-3)},
     "alpha 50": {"particles": bidisperse(50.0), "phi_start": 0.1},
